@@ -58,7 +58,7 @@ def parse_options():
     parser.add_argument("--frames", type=int, default=11,
                         help="of a round, at most (%(default)s)")
     parser.add_argument("--warmup", type=int, default=12,
-                        help="frames in front of them, in which the runtime "
+                        help="frames before them, in which the runtime "
                              "tries versions of loops, in a quarter of --seconds "
                              "(%(default)s)")
     parser.add_argument("--seconds", type=float, default=0.4,

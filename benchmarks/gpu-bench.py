@@ -70,7 +70,7 @@ def add_options(parser):
     parser.add_argument("--width", type=int)
     parser.add_argument("--height", type=int)
     parser.add_argument("--rounds", type=int)
-    parser.add_argument("--warmup", type=int, help="frames in front of a round")
+    parser.add_argument("--warmup", type=int, help="frames before a round")
     parser.add_argument("--frames", type=int, help="of a round, at most")
     parser.add_argument("--seconds", type=float, help="of frames in a round")
     parser.add_argument("--reruns", type=int)

@@ -11,7 +11,7 @@ which interprets PTX, once for each number of multiprocessors: seconds to minute
 
 For each kernel and chip: the least milliseconds that the chip's published limits
 (gpu_model/chips.json) allow for what was counted, what limits it, and how many they
-may be: work, and behind it the span. gpu_model/model.py says what is in it. What the
+may be: work, and after it the span. gpu_model/model.py says what is in it. What the
 host does is not. Nothing here is measured.
 """
 

@@ -87,7 +87,7 @@ class Example:
 
     def run(self, setting):
         """The report of kernels with a setting of mappings. What the runtime tries
-        is over in front of what is timed."""
+        is over before what is timed."""
         warmup, seconds = ("30", "2") if setting == "measured" else ("2", "0.4")
         report = json.loads(call([
             f"{self.arguments.bin}/piko-render", self.file, *self.scene,
@@ -281,7 +281,7 @@ def measure_case(arguments, case):
     Kernels change their settings in the same runs."""
     descents = [Descent(kernel) for kernel in case.run("expected")
                 if kernel["mappings"]]
-    most = 3  # turns; loops that are inside of each other are not more
+    most = 3  # iterations; loops that are inside of each other are not more
     for _ in range(most):
         lists = [descent.list_settings() for descent in descents]
         runs = max(map(len, lists), default=0)

@@ -3,7 +3,7 @@
 """Counts the work of a frame of each example beside the least that it needs.
 
 For each example and scene, as `piko-render --counters` has them: the calls of a
-stage for each element that it or a stage behind it writes, the turns of a loop
+stage for each element that it or a stage after it writes, the iterations of a loop
 for each emission or update in it, the lanes of vectors for each that does
 something, and the largest waste. Writes Markdown; --csv writes all numbers.
 """
@@ -61,7 +61,7 @@ def ratios(work):
     for loop in work["loops"]:
         if loop["effects"]:
             place = os.path.basename(loop["place"])
-            yield ("turns", f"{loop['stage']} ({place})", loop["turns"],
+            yield ("iterations", f"{loop['stage']} ({place})", loop["iterations"],
                    loop["effects"])
     for kernel in work["kernels"]:
         if kernel["lanes"]:
@@ -81,7 +81,7 @@ def worst(rows, kind):
 def main():
     options = parse_options()
     print("| example | scene | ms | calls for each element written | "
-          "turns for each effect | lanes for each that is used | "
+          "iterations for each effect | lanes for each that is used | "
           "largest waste |\n|---|---|---|---|---|---|---|")
     rows = []
     for example in options.examples:
@@ -98,7 +98,7 @@ def main():
             print(
                 f"| {example} | {name} | {report['ms_median']:.2f} | "
                 + " | ".join(worst(found, kind)
-                             for kind in ("calls", "turns", "lanes"))
+                             for kind in ("calls", "iterations", "lanes"))
                 + " | " + (f"{waste['ms']:.2f} ms: {waste['what']}".replace(
                     f"{ROOT}/", "")
                            if waste else "-") + " |", flush=True)

@@ -23,7 +23,7 @@ split-file. Substitutions:
   %other_cxx     another C++ compiler, where one can use this build's runtime
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %cxx_quick_host
-                 the same behind the precompiled header that such a host includes
+                 the same after the precompiled header that such a host includes
   %link_host     what such a host links
   %qt_include    folder of Qt's headers
   %test_driver   the driver for tests, in place of NVIDIA's
@@ -31,8 +31,8 @@ split-file. Substitutions:
   %cxx_ptx       compiler and flags that make PTX of a file of CUDA's
   %cxx_reference compiler and flags that build a pipeline file with the
                  reference executor
-  %cxx_behind_header
-                 the same behind a precompiled piko.h, for a file that includes
+  %cxx_after_header
+                 the same after a precompiled piko.h, for a file that includes
                  it first and whose options it does not depend on
 
 PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
@@ -110,7 +110,7 @@ config.environment["PIKO_CACHE_DIR"] = os.path.join(
 bunny = "/usr/share/glmark2/models/bunny.obj"
 include = os.path.join(config.piko_source_root, "runtime", "include")
 reference = [config.cxx, *config.reference_flags, "-I", include]
-behind_header = reference + (
+after_header = reference + (
     ["-include-pch", config.reference_header] if config.reference_header else []
 )
 host = [config.cxx, *config.host_flags, "-Wall -Wextra -Werror -I", include]
@@ -175,7 +175,7 @@ config.substitutions += [
     ("%cxx_quick_host", " ".join(quick_host)),
     ("%link_host", " ".join(link_host)),
     ("%cxx_reference", " ".join(reference)),
-    ("%cxx_behind_header", " ".join(behind_header)),
+    ("%cxx_after_header", " ".join(after_header)),
     ("%cxx_ptx", " ".join(ptx)),
     ("%cxx", config.cxx),
     ("%other_cxx", other_cxx),

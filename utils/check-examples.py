@@ -33,14 +33,14 @@ PROGRAM_OPS = re.compile(
     r"|gpu\.\w+)\b"
 )
 LIST_OPS = re.compile(r"piko\.(list_\w+|parallel_for)\b")
-BARRIERS = re.compile(r"piko\.(sync|reduce|scan|sort)\b")
+BARRIERS = re.compile(r"piko\.(sync|reduce|scan|sort|grouped)\b")
 
 NAMES = {
     "f32": "u v z depth",
     "i32": "x y x0 y0 x1 y1 one count zero id kind",
     "i64": "batch split mark lineage",
     "i1": "always isNaN isUnwritten",
-    "index": "a b bin call cell first hi i j lo n tile unit",
+    "index": "a b bin bucket call cell first hi i j lo n tile unit",
     "vector<16xf32>": "values",
     "vector<16xindex>": "as places",
     "vector<16xi32>": "lanes",

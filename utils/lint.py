@@ -8,12 +8,14 @@ paths     no file holds an absolute path of somebody's machine
 layers    the runtime's common part knows nothing of the targets' parts, nor the
           CPU's of CUDA's; no library includes a file of another one by its path
 folders   none of those by level has more files than a reader looks through
+words     terms are the field's: none of those of utils/words.txt
 tidy      clang-tidy over the compile commands of a build (--build DIR), or over
           the files without headers of LLVM, a folder at a time (--quick)
 all       all but the last
 """
 
 import argparse
+import bisect
 import concurrent.futures
 import json
 import os
@@ -160,8 +162,42 @@ def folders():
     return faults
 
 
+WORDS = "utils/words.txt"
+# Comments go from line to line.
+JOINED = re.compile(r"\s*\n\s*(?://+<?|#+|\*)?\s*")
+
+
+def words():
+    lines = [line for line in (ROOT / WORDS).read_text().splitlines()
+             if not line.startswith("#")]
+    banned = [(re.compile(pattern, re.I), instead)
+              for pattern, instead in (line.split("\t") for line in lines)]
+    faults = 0
+    for name in sources():
+        try:
+            text = (ROOT / name).read_text()
+        except UnicodeDecodeError:
+            continue
+        if name in (WORDS, "docs/Glossary.md"):
+            continue
+        starts, joined, end = [], "", 0
+        for match in JOINED.finditer(text):
+            starts.append(len(joined))
+            joined += text[end:match.start()] + " "
+            end = match.end()
+        joined += text[end:]
+        for pattern, instead in banned:
+            for match in pattern.finditer(joined):
+                # Empty lines are joined, too: near enough to find the place.
+                number = bisect.bisect_right(starts, match.start())
+                print(f"{name}:{number}: expected '{instead}', but got"
+                      f" '{match.group()}'")
+                faults += 1
+    return faults
+
+
 # No headers of LLVM, which take most of clang-tidy's time.
-QUICK = ("runtime/common", "runtime/cpu", "runtime/gpu", "runtime/cuda", "lib/Scene")
+QUICK = ("runtime/common", "runtime/cpu", "runtime/gpu", "runtime/cuda", "tools/scene")
 
 
 # What CMake writes to compile several files as one.
@@ -267,7 +303,8 @@ def main():
     )
     parser.add_argument(
         "check",
-        choices=["format", "licence", "paths", "layers", "folders", "tidy", "all"],
+        choices=["format", "licence", "paths", "layers", "folders", "words", "tidy",
+                 "all"],
     )
     parser.add_argument("--fix", action="store_true")
     parser.add_argument("--build", default="build")
@@ -280,11 +317,12 @@ def main():
         "paths": paths,
         "layers": layers,
         "folders": folders,
+        "words": words,
         "tidy": lambda: (tidy_quick if args.quick else tidy)(args.build, args.jobs),
     }
     names = [args.check]
     if args.check == "all":
-        names = ["format", "licence", "paths", "layers"]
+        names = ["format", "licence", "paths", "layers", "folders", "words"]
     faults = [name for name in names if checks[name]()]
     sys.exit(1 if faults else 0)
 

@@ -8,6 +8,7 @@ not what it would be.
 
 import argparse
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -43,13 +44,47 @@ def tidy(text):
     return "<!-- Made by `make docs` from the .td files. -->\n\n" + body + "\n"
 
 
+# The passes by the level that they work on, in the order in which they run.
+LEVELS = [
+    ("Instrumentation", "what is counted and checked, on request",
+     "Transforms/InstrumentationPasses.td"),
+    ("Specialization", "what constants and settings say",
+     "Transforms/SpecializationPasses.td"),
+    ("Authored level", "stages and their phases", "Transforms/AuthoredPasses.td"),
+    ("Kernels level", "phases that run together", "Transforms/KernelPasses.td"),
+    ("Machine level", "structured work on bins", "Transforms/MachinePasses.td"),
+    ("Loops for processors", "loops over what is stored",
+     "Transforms/CPUPasses.td"),
+    ("Vectors", "loops as lanes", "Transforms/VectorPasses.td"),
+    ("Conversions", "to upstream dialects, grids and LLVM",
+     "Conversion/Passes.td"),
+]
+
+
+def anchor(heading):
+    kept = (c for c in heading.lower() if c.isalnum() or c in " -_")
+    return "".join(kept).replace(" ", "-")
+
+
+def passes():
+    """A chapter for each level, and an index of them."""
+    index, chapters = [], []
+    for level, what, file in LEVELS:
+        text = tblgen("-gen-pass-doc", file)
+        entries = re.findall(r"^### `-([\w-]+)`\n+_(.*?)_$", text, re.M | re.S)
+        index.append(f"**[{level}](#{anchor(level)})**: {what}\n")
+        index += [f"- [`{name}`](#-{name}): {' '.join(summary.split())}"
+                  for name, summary in entries]
+        index.append("")
+        chapters.append(f"## {level}\n\n{text}")
+    return "\n".join(index + chapters)
+
+
 def documents():
     yield "Dialects/PikoReference.md", tblgen(
         "-gen-dialect-doc -dialect=piko", "Dialect/Piko/IR/PikoReference.td"
     )
-    yield "Passes.md", "# Passes\n\n" + tblgen(
-        "-gen-pass-doc", "Transforms/Passes.td", "Conversion/Passes.td"
-    )
+    yield "Passes.md", "# Passes\n\n" + passes()
 
 
 def main():

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- host.h - What runs a body, the same for every build of it ----------===//
 //
-// A body is a pipeline file with a host behind it, for -DPIKO_BODY: a struct
+// A body is a pipeline file with a host after it, for -DPIKO_BODY: a struct
 // that holds what goes in and out, binds it to a pipeline and gives a hash of
 // what came out. With -DPIKO_BODY_HEADER="..." the pipeline is the one that
 // pikoc has compiled, or else the reference executor's.

@@ -23,7 +23,7 @@ struct MomentState : State {
   piko::Image<MomentSums> sums;
 };
 
-/// A layer of 1 would hide all absorbance behind it.
+/// A layer of 1 would hide all absorbance after it.
 inline float absorbanceOf(float alpha) {
   return -piko::log(1 - glm::min(alpha, 0.99999f));
 }
@@ -52,7 +52,7 @@ public:
           (1 - bias) * (moments.power[i] / moments.power[0]) + bias * center[i];
   }
 
-  /// The share of absorbance in front of z, with `part` of what may be at z.
+  /// The share of absorbance before z, with `part` of what may be at z.
   float before(float z, float part) const {
     // c is the solution of H c = (1, z, z^2), H being the Hankel matrix of the
     // moments, by its LDL' decomposition.

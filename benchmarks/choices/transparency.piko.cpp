@@ -20,7 +20,7 @@ template <int K> struct NearestState : State {
   piko::Image<Nearest<K>> nearest;
 };
 
-// Insertion by depth; what comes first is in front of its equals.
+// Insertion by depth; what comes first is before its equals.
 template <Mapping M, int K>
 struct Keep : piko::Stage<M.bin, M.bin, 64, Layer>,
               piko::Uses<NearestState<K>> {
@@ -71,7 +71,7 @@ struct Compose : piko::Stage<M.bin, M.bin, 64, Nothing>,
 
 struct Sums {
   glm::vec4 weighted = glm::vec4(0);
-  float through = 1; // of the light behind all layers
+  float through = 1; // of the light after all layers
 };
 
 struct WeightedState : State {
@@ -110,9 +110,8 @@ struct Average : piko::Stage<M.bin, M.bin, 64, Nothing>,
         return;
       glm::vec3 mean = glm::vec3(sums.weighted) / sums.weighted.a;
       this->update(this->state().color, p, [&](Color &c) {
-        glm::vec3 behind(c.rgba);
-        c.rgba =
-            glm::vec4(mean * (1 - sums.through) + behind * sums.through, 1);
+        glm::vec3 after(c.rgba);
+        c.rgba = glm::vec4(mean * (1 - sums.through) + after * sums.through, 1);
       });
     });
   }

@@ -25,9 +25,9 @@ class Chip:
     shared_cycles: int
     l1_cycles: int
     l2_cycles: int
-    launch_us: float  # of a kernel behind another in a stream
+    launch_us: float  # of a kernel after another in a stream
     graph_us: float  # in a graph
-    wait_us: float  # of the host for the device, and the launch behind it
+    wait_us: float  # of the host for the device, and the launch after it
     sources: tuple
 
     @property

@@ -8,7 +8,7 @@ Evaluation of General Arithmetic Expressions, JACM 21(2), 1974):
   the span: how long the last warp runs that has a multiprocessor for itself, whose
   instructions wait for what they read. Caches hold what they can. No kernel can be
   faster that has as much room for blocks as was assumed.
-* `most`: the work and behind it the span, as a device does that always runs
+* `most`: the work and after it the span, as a device does that always runs
   something when it can, with caches that hold nothing for long: loads find what they
   read in the L2 cache. Kernels may be still slower: banks of shared memory and
   atomics on one address are not in it.

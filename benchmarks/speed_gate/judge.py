@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """What two builds took in turn, and whether the new one lost.
 
-A round has a time of each build, one right behind the other, so that a ratio of
+A round has a time of each build, one right after the other, so that a ratio of
 the two is free of what changes slowly. Ratios are judged by a sign test, which
 takes no noise to have any form: a time is *slower* if so many rounds lost more
 than the tolerance as chance would give once in a thousand if half of them did, and

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""What a part of the suite gives: a table, the numbers behind it, a chart."""
+"""What a part of the suite gives: a table, the numbers after it, a chart."""
 
 import statistics
 from dataclasses import dataclass, field

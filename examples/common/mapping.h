@@ -19,7 +19,7 @@ struct Mapping {
   piko::SchedulePolicy core = piko::LoadBalance;
   piko::SchedulePolicy rest = core; ///< of the stages behind the second one
   int64_t split = 0;                ///< how many primitives `All` cores share
-  bool apart = true;  ///< whether stages behind the first ask for a core
+  bool apart = true;  ///< whether stages after the first ask for a core
   bool waits = false; ///< whether shading begins when a bin is complete
   piko::Precision precision = piko::Precision::Strict; ///< of shading
 };

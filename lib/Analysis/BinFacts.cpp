@@ -60,7 +60,7 @@ bool LinearFacts::isInside(ListAtOp read) {
           isAtLeastZero(getListSize(read.getList()) - index - Linear(1)));
 }
 
-/// What stands in front of the place has run, if the place is reached.
+/// What stands before the place has run, if the place is reached.
 void LinearFacts::findItems() {
   constexpr size_t most = 8; // each costs a search for proofs
   for (Operation *op = at; !isa<ProcessOp>(op); op = op->getParentOp())

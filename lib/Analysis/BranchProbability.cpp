@@ -43,16 +43,16 @@ std::optional<double> piko::getProbability(cf::CondBranchOp branch) {
   return first / (first + second);
 }
 
-std::optional<double> piko::getTurnProbability(Operation *loop) {
+std::optional<double> piko::getIterationProbability(Operation *loop) {
   // As branch weights have it, none is impossible.
   constexpr double least = 1.0 / (1 << 20);
   std::optional<double> again = getMark(loop);
   return again ? std::optional(std::max(*again, least)) : std::nullopt;
 }
 
-std::optional<double> piko::getProbableTurns(Operation *loop) {
+std::optional<double> piko::getProbableIterations(Operation *loop) {
   constexpr double most = 1 << 20;
-  std::optional<double> again = getTurnProbability(loop);
+  std::optional<double> again = getIterationProbability(loop);
   if (!again)
     return std::nullopt;
   return *again < 1 ? std::min(most, *again / (1 - *again)) : most;
@@ -72,13 +72,13 @@ void piko::setProbability(Operation *op, std::optional<double> probability) {
 namespace {
 
 /// Follows the ways through a body to their ends; inner loops end.
-class Turn {
+class AnotherIteration {
 public:
-  explicit Turn(BlockArgument again) : again(again) {}
+  explicit AnotherIteration(BlockArgument again) : again(again) {}
 
-  /// What is known where a block begins: how probable another turn is, unless
-  /// all ways return to a block that was entered before; and the first one of
-  /// these that any of them returns to.
+  /// What is known where a block begins: how probable another iteration is,
+  /// unless all ways return to a block that was entered before; and the first
+  /// one of these that any of them returns to.
   struct Answer {
     std::optional<double> probability;
     bool returns = false;
@@ -102,7 +102,8 @@ private:
 
 } // namespace
 
-Turn::Answer Turn::along(Operation *branch, unsigned successor) {
+AnotherIteration::Answer AnotherIteration::along(Operation *branch,
+                                                 unsigned successor) {
   Block *to = branch->getSuccessor(successor);
   if (to != again.getOwner())
     return at(to);
@@ -114,7 +115,7 @@ Turn::Answer Turn::along(Operation *branch, unsigned successor) {
   return {flag.isZero() ? 0.0 : 1.0};
 }
 
-Turn::Answer Turn::find(Block *block, size_t number) {
+AnotherIteration::Answer AnotherIteration::find(Block *block, size_t number) {
   Operation *branch = block->getTerminator();
   if (!isa<BranchOpInterface>(branch))
     return {};
@@ -144,7 +145,7 @@ Turn::Answer Turn::find(Block *block, size_t number) {
   return all;
 }
 
-Turn::Answer Turn::at(Block *block) {
+AnotherIteration::Answer AnotherIteration::at(Block *block) {
   const size_t number = known.size();
   auto [found, isNew] = known.try_emplace(block, Entered{number, {}});
   if (!isNew) {
@@ -157,9 +158,9 @@ Turn::Answer Turn::at(Block *block) {
   return answer;
 }
 
-std::optional<double> piko::computeTurnProbability(Block *first,
-                                                   BlockArgument again) {
-  return Turn(again).at(first).probability;
+std::optional<double> piko::computeIterationProbability(Block *first,
+                                                        BlockArgument again) {
+  return AnotherIteration(again).at(first).probability;
 }
 
 //===----------------------------------------------------------------------===//

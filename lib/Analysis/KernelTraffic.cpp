@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // A kernel is a nest of parts: a bin, its primitives, the iterations of
-// parallel loops, the turns of others. An access belongs to the innermost part
-// around it, but a field of a primitive to the part that has the primitive,
-// because it is read once and kept.
+// parallel loops, the iterations of others. An access belongs to the innermost
+// part around it, but a field of a primitive to the part that has the
+// primitive, because it is read once and kept.
 
 #include "Piko/Analysis/KernelTraffic.h"
 

@@ -119,7 +119,7 @@ LinearFacts::Id LinearFacts::number(Value value, unsigned frame) {
   if (auto found = ids.find({value, frame}); found != ids.end())
     return found->second;
   Id id;
-  const Frame at = frames[frame];
+  const Scope at = frames[frame];
   Operation *op = value.getDefiningOp();
   auto get = dyn_cast_or_null<GetOp>(op);
   Value emitted = get && at.emit && get.getPrim() == at.primitive
@@ -240,9 +240,9 @@ Linear LinearFacts::expandArgument(BlockArgument argument, unsigned frame,
     Linear i = atom(id);
     facts->addBetween(low, i, high - Linear(1));
     if (APInt step; isConstant(loop.getStep(), step)) {
-      Linear turn = system.addVariable();
-      facts->addAtLeastZero(turn);
-      facts->addZero(i - low - turn * DynamicAPInt(step.getSExtValue()));
+      Linear iteration = system.addVariable();
+      facts->addAtLeastZero(iteration);
+      facts->addZero(i - low - iteration * DynamicAPInt(step.getSExtValue()));
     }
     return i;
   }
@@ -264,9 +264,9 @@ Linear LinearFacts::expandCarried(BlockArgument argument, Value init,
   if (recurrence.floor)
     facts->addAtLeastZero(value - get(recurrence.floor, frame));
   if (recurrence.step) {
-    Linear turn = system.addVariable();
-    facts->addAtLeastZero(turn);
-    facts->addZero(value - first - turn * DynamicAPInt(*recurrence.step));
+    Linear iteration = system.addVariable();
+    facts->addAtLeastZero(iteration);
+    facts->addZero(value - first - iteration * DynamicAPInt(*recurrence.step));
     return value;
   }
   if (recurrence.rises)

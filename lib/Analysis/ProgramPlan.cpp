@@ -152,7 +152,7 @@ bool ProgramPlan::needsBinOrderOnly(const PlannedEdge &edge) const {
 /// A stage that runs bin by bin emits in the order of bins, which is that of
 /// lineage only if it collects, and then only without tiles. But where the bins
 /// of the next stage are the same, each gets what it needs in order; that of
-/// different bins shows if it does behind that stage, unless that one collects.
+/// different bins shows if it does after that stage, unless that one collects.
 void ProgramPlan::findGathers() {
   binOrder.assign(graph.stages.size(), true);
   for (bool changed = true; changed;) {

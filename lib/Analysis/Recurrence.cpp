@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // By induction: what is said of an argument holds at first, and if it holds in
-// one turn of the loop, then also in the next. All is said of numbers that do
-// not wrap around.
+// one iteration of the loop, then also in the next. All is said of numbers that
+// do not wrap around.
 //
 //===----------------------------------------------------------------------===//
 
@@ -67,7 +67,7 @@ struct Limits {
     return (!ceiling || facts.isAtLeastZero(facts.get(ceiling) - number)) &&
            (!floor || facts.isAtLeastZero(number - facts.get(floor)));
   }
-  /// Whether they hold at first, and then in each turn.
+  /// Whether they hold at first, and then in each iteration.
   bool hold(scf::WhileOp loop, FactsProvider &provider) const {
     unsigned i = argument.getArgNumber();
     LinearFacts before(loop, provider);

@@ -203,7 +203,7 @@ bool Uniformity::isInside(Value array) const {
   return made && root->isProperAncestor(made);
 }
 
-/// Whether an array is filled in front of the root, which only reads it.
+/// Whether an array is filled before the root, which only reads it.
 bool Uniformity::isFinished(Value array) const {
   auto made = array.getDefiningOp<memref::AllocaOp>();
   return made && llvm::all_of(made->getUsers(), [&](Operation *user) {

@@ -9,8 +9,8 @@
 
 namespace piko {
 
-/// In front of what `user`'s operand is to be loaded: of the outermost loop in
-/// `around` that has no loop in its body but those around the user. In front of
+/// Before what `user`'s operand is to be loaded: of the outermost loop in
+/// `around` that has no loop in its body but those around the user. Before
 /// a loop that has, the number would be kept over one that does not need it.
 mlir::Operation *findLoadPlace(mlir::Operation *user, mlir::Operation *around);
 

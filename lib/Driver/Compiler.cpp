@@ -294,7 +294,7 @@ static LogicalResult checkStart(ModuleOp module, Level from, Level to,
   return success();
 }
 
-/// Verifies what comes out. Debug builds and piko-opt do so behind each pass.
+/// Verifies what comes out. Debug builds and piko-opt do so after each pass.
 static LogicalResult run(PassManager &passes, ModuleOp module) {
 #ifdef NDEBUG
   passes.enableVerifier(false);

@@ -14,7 +14,7 @@ namespace piko {
 bool isCppIdentifier(llvm::StringRef name);
 
 /// Letters, digits and '_' stay; what lies between becomes one '_'. A keyword
-/// gets one behind it.
+/// gets one after it.
 std::string makeIdentifier(llvm::StringRef name);
 
 /// The last name of a C++ path, as an identifier: `Pair_int` of
@@ -28,7 +28,7 @@ public:
   void reserve(llvm::StringRef name) { names.insert(name); }
   /// Whether it is an identifier that nobody has taken.
   bool isFree(llvm::StringRef name) const;
-  /// Takes an identifier, with a number behind it if it is taken.
+  /// Takes an identifier, with a number after it if it is taken.
   std::string declare(llvm::StringRef name);
 
 private:

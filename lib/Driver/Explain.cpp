@@ -32,7 +32,7 @@ struct Trace {
     std::vector<std::string> texts = {}; ///< each once
     llvm::StringSet<> known = {};
   };
-  OwningOpRef<ModuleOp> ordered; ///< as it was behind piko-order-stages
+  OwningOpRef<ModuleOp> ordered; ///< as it was after piko-order-stages
   std::vector<Remarks> remarks;  ///< of the passes that made any, in order
   std::string pass;              ///< that is running
   llvm::StringSet<> passes;      ///< that have run
@@ -84,7 +84,7 @@ private:
   bool hasKernel(int64_t source);
   /// The kernel that runs a stage's process phase, or an empty name.
   StringRef getKernelOf(StringRef stage);
-  /// The barrier in front of a stage's process phase, or null.
+  /// The barrier before a stage's process phase, or null.
   LocalBarrierOp getBarrier(StringRef stage);
   /// How the stage waits until a bin is complete.
   std::string describeBinWait(StageOp stage);
@@ -197,7 +197,7 @@ LocalBarrierOp Report::getBarrier(StringRef stage) {
 
 std::string Report::describeBinWait(StageOp stage) {
   if (LocalBarrierOp barrier = getBarrier(stage.getSymName()))
-    return ("a local barrier behind " + barrier.getProducer() + " in " +
+    return ("a local barrier after " + barrier.getProducer() + " in " +
             getKernelOf(stage.getSymName()))
         .str();
   std::string text = "a kernel break, ";
@@ -253,7 +253,7 @@ void Report::writeWaits(StageOp stage) {
       if (kernel.empty())
         out << "it was removed\n";
       else
-        out << "a kernel break behind " << kernel << "\n";
+        out << "a kernel break after " << kernel << "\n";
     }
   if (schedule && schedule.getEndBin())
     out << "    waits until nothing can reach the bin: "

@@ -254,7 +254,7 @@ std::optional<MemberType> RecordWriter::Layouter::getMember(
   return std::nullopt;
 }
 
-/// Puts a member at its offset; behind a number of the same type, on its line.
+/// Puts a member at its offset; after a number of the same type, on its line.
 bool RecordWriter::Layouter::place(Layout &layout, const MemberType &member,
                                    StringRef name, int64_t offset,
                                    int64_t maxAlign,

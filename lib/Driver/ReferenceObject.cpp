@@ -27,7 +27,7 @@ static const char *const referenceEntry = "piko_reference_program";
 
 namespace {
 
-/// The first step: the C++ that Clang compiles behind the file, and with which
+/// The first step: the C++ that Clang compiles after the file, and with which
 /// macros.
 struct Adapter {
   std::string text;

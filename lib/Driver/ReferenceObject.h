@@ -3,7 +3,7 @@
 // The reference executor of a file as an object, through the cache. It takes
 // two steps, so that it is compiled again only where Clang would make something
 // else: the frontend describes the file's pipelines to the runtime, in C++, and
-// Clang compiles that behind the file. What the first step gave is kept as long
+// Clang compiles that after the file. What the first step gave is kept as long
 // as the frontend is the same; of the second, the key is Clang, what it is
 // given, and the files that it reads. No pass of Piko's is in either.
 

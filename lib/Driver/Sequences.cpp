@@ -67,7 +67,7 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   passes.nest<PipelineOp>().addPass(createApplyPrecision());
   if (!counts)
     addFixedConstants(passes, options);
-  // A field that a loop reads is the same field behind it.
+  // A field that a loop reads is the same field after it.
   passes.addPass(createLoopInvariantCodeMotionPass());
   addCleanUp(passes);
   passes.addPass(createNormalizeLoops());

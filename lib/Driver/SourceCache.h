@@ -15,7 +15,7 @@
 
 namespace piko {
 
-/// Strings, each behind its length.
+/// Strings, each after its length.
 class StringWriter {
 public:
   StringWriter &add(llvm::StringRef string);

@@ -26,7 +26,7 @@ struct Part {
 
 } // namespace
 
-/// `.name` or `[number]` in front of a path; nothing if it begins otherwise.
+/// `.name` or `[number]` before a path; nothing if it begins otherwise.
 static std::optional<std::string> takeStep(StringRef &path) {
   bool isIndex = path.consume_front("[");
   if (!isIndex && !path.consume_front("."))

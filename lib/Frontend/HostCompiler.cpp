@@ -38,7 +38,7 @@ static Files openFiles(const FrontendOptions &options) {
 
 namespace {
 
-/// One run of Clang behind a precompiled header, if there is one.
+/// One run of Clang after a precompiled header, if there is one.
 class HostCompiler {
 public:
   HostCompiler(const FrontendOptions &options, bool optimize,
@@ -140,7 +140,7 @@ HostCode piko::compileForHost(llvm::StringRef text, llvm::StringRef userFile,
                               mlir::MLIRContext &context) {
   HostCompiler compiler(options, optimize, llvmContext, context);
   bool hasHeader = compiler.readHeader(userFile);
-  std::string mainText = hasHeader ? getTextBehindHeader(options) : "";
+  std::string mainText = hasHeader ? getTextAfterHeader(options) : "";
   mainText += text;
   return {compiler.compile(mainText, mainName, /*emitsHeader=*/false),
           hasHeader && !optimize};

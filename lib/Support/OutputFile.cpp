@@ -203,7 +203,7 @@ public:
   explicit OutputPlace(const std::string &path) : path(path) {}
 
   const std::string &name() const { return path; }
-  /// Whether others appear behind it, for it cannot be taken back.
+  /// Whether others appear after it, for it cannot be taken back.
   bool isDirect() const { return !file; }
 
   Errno write(std::string_view text) {

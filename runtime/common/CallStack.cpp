@@ -140,7 +140,7 @@ static ThreadStacks &threadStacks() {
   return stacks;
 }
 
-/// Where a new stack begins; behind it `uc_link` is gone on with.
+/// Where a new stack begins; after it `uc_link` is gone on with.
 static void enter() { starting->run(); }
 
 static void callOn(const Bounds &bounds, void (*body)(void *), void *data) {

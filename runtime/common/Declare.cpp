@@ -207,7 +207,7 @@ void pikoir_declare_mapping(pikort_pipeline *p, int32_t stage, int32_t source,
 void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,
                           int32_t record, const int64_t *binSize,
                           int32_t schedule, int64_t tileSplit, int32_t flags,
-                          int64_t cellSize) {
+                          int64_t tileSize) {
   guarded(p, "setup", [&] {
     Stage &stage = declare(p->stages, id, "stage");
     stage.name = orEmpty(name);
@@ -215,14 +215,14 @@ void pikoir_declare_stage(pikort_pipeline *p, int32_t id, const char *name,
     stage.schedule.kind = schedule;
     stage.schedule.tileSplit = tileSplit;
     stage.flags = flags;
-    stage.cellSize = cellSize;
+    stage.tileSize = tileSize;
     std::string who = "stage " + quoted(stage.name);
     expect(p->rank >= 1 && p->rank <= 4,
            who + ": expected the pipeline to be declared first");
     expect(schedule >= PIKOIR_LOAD_BALANCE && schedule <= PIKOIR_ALL,
            who + ": expected a schedule in [0, 3], but got " +
                std::to_string(schedule));
-    expect(tileSplit >= 0 && cellSize >= 0,
+    expect(tileSplit >= 0 && tileSize >= 0,
            who + ": expected no negative tile size");
     for (int32_t d = 0; d < p->rank; ++d) {
       stage.binSize[d] = binSize ? binSize[d] : 0;

@@ -40,7 +40,7 @@ public:
   virtual bool isDone() const { return true; }
   /// Waits for the end of the run; returns its status. Throws.
   virtual int32_t awaitProgram() { return 0; }
-  /// Whether the run was repeated, behind what the device's stream had by then.
+  /// Whether the run was repeated, after what the device's stream had by then.
   virtual bool wasRepeated() const { return false; }
   /// After it, and after any error of beginRun: frees what the run held.
   virtual void endRun() = 0;

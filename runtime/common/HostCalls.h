@@ -36,7 +36,7 @@ template <class Body> int32_t call(pikort_pipeline *p, Body &&body) noexcept {
 /// `body` does not throw, and has its own copies of what it needs.
 template <class Body> void change(pikort_pipeline *p, Body body) {
   if (p->pending)
-    p->deferred.emplace_back(std::move(body));
+    p->queuedChanges.emplace_back(std::move(body));
   else
     body();
 }

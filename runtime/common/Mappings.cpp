@@ -69,7 +69,7 @@ void SettingReader::readEntry(std::string_view entry) {
       names += (names.empty() ? "" : ", ") + nameOf(mapping);
     fail(names.empty() ? "no loop by name, as the code holds none in two "
                          "versions"
-                       : "one of " + names + " in front of '='",
+                       : "one of " + names + " before '='",
          entry);
   }
   choices[static_cast<size_t>(found - p_.mappings.begin())] =

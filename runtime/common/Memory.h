@@ -81,7 +81,7 @@ private:
     int64_t frame; ///< When it was last in use.
   };
   class MappingTimer;
-  /// Where to map next: behind the block before, so that an index can reach
+  /// Where to map next: after the block before, so that an index can reach
   /// from one to the other. Small blocks would go into any gap.
   uint8_t *findRoom(size_t bytes);
   uint8_t *map(size_t bytes);

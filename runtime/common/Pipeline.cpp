@@ -58,7 +58,7 @@ void pikort_pipeline::checkDeclared() {
     record.padded = hasPadding(record);
   for (const Stage &stage : stages) {
     checkRecord(stage.record, stage.name);
-    if (stage.takesList() && stage.cellSize > 0)
+    if (stage.takesList() && stage.tileSize > 0)
       bad("stage " + quoted(stage.name) +
           ": a process that takes a list has no owner tiles");
     if (!stage.takesList() && (stage.schedule.batch || stage.schedule.everyBin))
@@ -66,7 +66,7 @@ void pikort_pipeline::checkDeclared() {
           ": a batch needs a process that takes a list");
     for (int32_t id : stage.clears)
       if (static_cast<size_t>(id) >= states.size() ||
-          states[id].kind != PIKORT_IMAGE || stage.cellSize > 0 ||
+          states[id].kind != PIKORT_IMAGE || stage.tileSize > 0 ||
           stage.flags & PIKOIR_SPLIT)
         bad("stage " + quoted(stage.name) +
             ": expected an image to clear, and bins that are not split, but "
@@ -206,14 +206,14 @@ void pikort_pipeline::findStrips() {
   }
 }
 
-/// Completes the stages behind local edges.
+/// Completes the stages after local edges.
 void pikort_pipeline::findLocals() {
   for (const Edge &edge : edges) {
     if (!edge.local)
       continue;
     const Stage &from = stages[edge.producer], &to = stages[edge.consumer];
     auto isAlone = [](const Stage &stage) {
-      return stage.cycle < 0 && stage.cellSize == 0 &&
+      return stage.cycle < 0 && stage.tileSize == 0 &&
              !(stage.flags & PIKOIR_SPLIT);
     };
     if (from.stripGroup != to.stripGroup || !to.collects() ||
@@ -258,26 +258,26 @@ void pikort_pipeline::computeGrids() {
                         "but the domain has " +
                         std::to_string(domain[d])};
   for (Stage &stage : stages) {
-    stage.grid = stage.cellGrid = {1, 1, 1, 1};
-    stage.tiles = stage.cells = 1;
+    stage.grid = stage.tileGrid = {1, 1, 1, 1};
+    stage.tiles = stage.buckets = 1;
     bool overflow = false;
     for (int32_t d = 0; d < rank; ++d) {
       int64_t bin = stage.binSize[d] == 0
                         ? domain[d]
                         : std::min(stage.binSize[d], domain[d]);
       stage.grid[d] = (domain[d] + bin - 1) / bin;
-      if (stage.cellSize > 0)
-        stage.cellGrid[d] = (bin + stage.cellSize - 1) / stage.cellSize;
+      if (stage.tileSize > 0)
+        stage.tileGrid[d] = (bin + stage.tileSize - 1) / stage.tileSize;
       overflow |=
-          __builtin_mul_overflow(stage.tiles, stage.cellGrid[d], &stage.tiles);
+          __builtin_mul_overflow(stage.tiles, stage.tileGrid[d], &stage.tiles);
       overflow |= __builtin_mul_overflow(
-          stage.cells, stage.grid[d] * stage.cellGrid[d], &stage.cells);
+          stage.buckets, stage.grid[d] * stage.tileGrid[d], &stage.buckets);
     }
-    // Cells are noted in 31 bits, and one value is kept for "none".
-    if (overflow || stage.cells >= INT32_MAX)
+    // Buckets are noted in 31 bits, and one value is kept for "none".
+    if (overflow || stage.buckets >= INT32_MAX)
       throw Failure{PIKORT_TOO_MANY,
                     "stage " + quoted(stage.name) +
-                        ": expected fewer than 2147483647 cells, but the "
+                        ": expected fewer than 2147483647 buckets, but the "
                         "domain has more"};
   }
 }
@@ -324,13 +324,13 @@ static const char *describe(BadCall call) {
   case BadCall::Next:
     return "expected one pikoir_next for each position";
   case BadCall::Nested:
-    return "expected deferred emissions to end before others begin";
-  case BadCall::NotDeferring:
-    return "expected pikoir_defer_begin before an iteration and the end";
+    return "expected reordered emissions to end before others begin";
+  case BadCall::NotReordering:
+    return "expected pikoir_reorder_begin before an iteration and the end";
   case BadCall::Iteration:
-    return "expected an iteration of those that pikoir_defer_begin named";
-  case BadCall::StillDeferring:
-    return "expected pikoir_defer_end before the position ends";
+    return "expected an iteration of those that pikoir_reorder_begin named";
+  case BadCall::StillReordering:
+    return "expected pikoir_reorder_end before the position ends";
   }
   return "made a wrong call";
 }

@@ -182,7 +182,7 @@ struct Stage {
   bool declared = false;
   std::string name;
   int32_t record = 0, flags = 0;
-  int64_t cellSize = 0;
+  int64_t tileSize = 0;
   BinSchedule schedule; ///< Of all bins.
   std::array<int64_t, 4> binSize{};
   int32_t root = 0;     ///< Of the lineage that it starts.
@@ -197,24 +197,24 @@ struct Stage {
   int32_t loop = -1;
   int32_t stripGroup = -1;
   bool sharesTile = false;     ///< A strip is a tile: threads share it.
-  int32_t host = -1;           ///< In whose kernel it runs, behind local edges.
+  int32_t host = -1;           ///< In whose kernel it runs, after local edges.
   int32_t depth = 0;           ///< How many local edges lie before it.
   bool hosts = false;          ///< Other stages run in its kernel, ...
   bool visitsAll = false;      ///< ... some of them for empty bins, too.
   std::vector<int32_t> clears; ///< Images that its first kernel clears.
   // Completed by each run:
-  std::array<int64_t, 4> grid{}, cellGrid{};
-  int64_t tiles = 1, cells = 1;
+  std::array<int64_t, 4> grid{}, tileGrid{};
+  int64_t tiles = 1, buckets = 1;
   Array<BinSchedule> binSchedules; ///< If they depend on the bin.
 
-  int64_t bins() const { return cells / tiles; }
+  int64_t bins() const { return buckets / tiles; }
   const BinSchedule &scheduleOf(int64_t bin) const {
     return binSchedules ? binSchedules[bin] : schedule;
   }
   bool takesList() const { return flags & PIKOIR_LIST; }
   bool collects() const { return flags & (PIKOIR_COLLECTS | PIKOIR_LIST); }
   bool ordered() const { return flags & PIKOIR_ORDERED && !unordered(); }
-  /// Positions of a cell may be in several units.
+  /// Positions of a bucket may be in several units.
   bool splits() const {
     return flags & PIKOIR_SPLIT && (!ordered() || !selections.empty());
   }
@@ -259,12 +259,12 @@ struct StageStats {
 
 /// What generated code did wrong between open and close; `a` of the error.
 enum class BadCall : int64_t {
-  PlaceFirst,   ///< A place before its record.
-  Next,         ///< Not one pikoir_next for each position.
-  Nested,       ///< pikoir_defer_begin twice.
-  NotDeferring, ///< defer_iteration or defer_end outside.
-  Iteration,    ///< Outside of the range that defer_begin gave.
-  StillDeferring
+  PlaceFirst,    ///< A place before its record.
+  Next,          ///< Not one pikoir_next for each position.
+  Nested,        ///< pikoir_reorder_begin twice.
+  NotReordering, ///< reorder_iteration or reorder_end outside.
+  Iteration,     ///< Outside of the range that reorder_begin gave.
+  StillReordering
 };
 
 /// An error that a kernel found. Kernels are parallel: the one that the
@@ -273,7 +273,7 @@ struct KernelError {
   int64_t unit;
   int32_t code, stage;
   int64_t a, b;
-  /// Of the stage that ran: all of one comes before all behind a local edge.
+  /// Of the stage that ran: all of one comes before all after a local edge.
   int32_t depth = 0;
   int64_t bin = -1;           ///< Of the call of Process; -1 = none.
   std::string_view name = {}; ///< Of the stage, if it is part of another.
@@ -338,7 +338,7 @@ struct pikort_pipeline {
   // Of a run that the host has not waited for:
   bool pending = false;
   /// What it changes for later runs meanwhile.
-  std::vector<std::function<void()>> deferred;
+  std::vector<std::function<void()>> queuedChanges;
   /// How it has ended, where no call has said so yet.
   piko::rt::Failure unsaid{};
 

@@ -231,7 +231,7 @@ void piko::rt::awaitRun(pikort_pipeline &p) noexcept {
   guardedWithStack(p, [&] { awaitPending(p); });
   int32_t code = end(p);
   p.pending = false;
-  for (const std::function<void()> &change : std::exchange(p.deferred, {}))
+  for (const std::function<void()> &change : std::exchange(p.queuedChanges, {}))
     change();
   if (code != PIKORT_OK)
     p.unsaid = {code, std::move(p.message)};

@@ -16,10 +16,10 @@ static constexpr double margin = 0.98;
 /// A unit that takes longer than so many others was interrupted.
 static constexpr double interrupted = 8;
 
-/// What a unit has to do, about: primitives and cells, at least one.
+/// What a unit has to do, about: primitives and buckets, at least one.
 static double weightOf(const pikoir_unit &unit) {
   return static_cast<double>(std::max<int64_t>(
-      1, unit.end - unit.begin + unit.cell_end - unit.cell_begin));
+      1, unit.end - unit.begin + unit.bucket_end - unit.bucket_begin));
 }
 
 void Autotuner::Samples::add(double ticks, double weight) {

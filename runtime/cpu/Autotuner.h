@@ -48,12 +48,12 @@ public:
   void beginLaunch(std::span<const pikoir_unit> units);
   /// What a unit runs: pikoir_writer::mappings.
   int64_t begin(int64_t unit, AutotunerThread &thread);
-  /// That a unit has ended, behind so many ticks.
+  /// That a unit has ended, after so many ticks.
   void end(const pikoir_unit &unit, AutotunerThread &thread, int64_t ticks) {
     if (trying_)
       note(unit, thread, ticks);
   }
-  /// Behind the units, which took so many ticks together.
+  /// After the units, which took so many ticks together.
   void endLaunch(int64_t ticks);
   /// What a launch without units of work runs.
   int64_t getCurrent() const;

@@ -144,7 +144,7 @@ int64_t Checker::emit() {
 
 /// Goes on with an iteration of the innermost loop.
 void Checker::enter(int64_t iteration) {
-  Loop &loop = loops.back();
+  LoopState &loop = loops.back();
   strands.push_back(
       {loop.strand, loop.number, loop.intervals[iteration], iteration});
   strand = static_cast<int32_t>(strands.size()) - 1;
@@ -171,7 +171,7 @@ void Checker::loop(int32_t event, int64_t iteration) {
 
 /// Iterations that meet take turns; their emissions are in order of iteration
 /// nevertheless.
-void Checker::numberEmissions(const Loop &loop) {
+void Checker::numberEmissions(const LoopState &loop) {
   std::vector<size_t> order(loop.emitters.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
@@ -327,7 +327,7 @@ void pikoir_declare_checked_record(pikort_pipeline *p, int32_t record,
         p->records[host].size > lineageOffset)
       throw Failure{PIKORT_BAD_PROGRAM,
                     "expected a checked record to hold the host's and a "
-                    "lineage behind it"};
+                    "lineage after it"};
     p->records[record].host = host;
     p->records[record].lineageOffset = lineageOffset;
     if (std::unique_ptr<Checker> &checker = cpuOf(*p).checker; !checker)

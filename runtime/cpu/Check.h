@@ -112,7 +112,7 @@ public:
   std::string describe(int32_t code, const std::string &plain) const;
 
 private:
-  struct Loop {
+  struct LoopState {
     int64_t number;
     int32_t strand; ///< Around it.
     size_t firstEmission;
@@ -140,7 +140,7 @@ private:
   void copySource(int32_t source);
   void testNumbers(int32_t source, const uint8_t *primitive, int64_t index);
   void enter(int64_t iteration);
-  void numberEmissions(const Loop &loop);
+  void numberEmissions(const LoopState &loop);
   void fail(int32_t stage, const std::string &text);
   void endless(const char *at);
   void report(int32_t code, int64_t a, int64_t b);
@@ -169,8 +169,8 @@ private:
   int32_t assignStage = -1; ///< Whose AssignBin runs; -1 = none.
   int64_t assignLineage = 0;
 
-  std::vector<Strand> strands; ///< Of the call.
-  std::vector<Loop> loops;     ///< The innermost last.
+  std::vector<Strand> strands;  ///< Of the call.
+  std::vector<LoopState> loops; ///< The innermost last.
   int32_t strand = 0;
   std::vector<PendingRead> reads;
   std::unordered_map<uint64_t, std::vector<Access>> shadow;

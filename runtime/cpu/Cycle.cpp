@@ -12,7 +12,7 @@ Cycle::Cycle(pikort_pipeline &p, int32_t number)
   for (size_t l = 0; l < p.loops.size(); ++l)
     if (p.loops[l].cycle == number)
       loops_.push_back(
-          {static_cast<int32_t>(l), Loop::make(p, p.loops[l]), false});
+          {static_cast<int32_t>(l), StageLoop::make(p, p.loops[l]), false});
   std::copy_if(stages_.begin(), stages_.end(), std::back_inserter(collectors_),
                [&](int32_t s) { return p.stages[s].collects(); });
 }
@@ -160,7 +160,7 @@ Edge *Cycle::onlyInput(const Stage &stage) const {
 }
 
 /// Serial launches emit in the order of processing. That must be the order of
-/// lineage, too, and what they emit must not need keys that tell cells.
+/// lineage, too, and what they emit must not need keys that tell buckets.
 bool Cycle::runsSerially(Kernel &kernel) const {
   expectChosen(kernel);
   if (loop_)

@@ -47,7 +47,7 @@ public:
 private:
   struct Part {
     int32_t number; ///< Of the loop.
-    std::unique_ptr<Loop> loop;
+    std::unique_ptr<StageLoop> loop;
     bool started = false; ///< In this spread.
   };
 
@@ -74,10 +74,10 @@ private:
   int64_t launches_ = 0;    ///< Of collectors.
   bool fromOutside_ = true; ///< This spread takes what comes into the cycle.
   bool finished_ = false;
-  int32_t chosen_ = -1;  ///< The stage whose kernel is to run.
-  Loop *loop_ = nullptr; ///< Its loop, if it is of one.
-  Queue input_;          ///< What a serial launch outside of loops takes.
-  bool begun_ = false;   ///< It has its input.
+  int32_t chosen_ = -1;       ///< The stage whose kernel is to run.
+  StageLoop *loop_ = nullptr; ///< Its loop, if it is of one.
+  Queue input_;               ///< What a serial launch outside of loops takes.
+  bool begun_ = false;        ///< It has its input.
 };
 
 /// Makes the cycles of a run, and frees them.

@@ -150,7 +150,7 @@ static Segments collect(Kernel &kernel, size_t port, Log PortLogs::*which) {
 }
 
 /// Calls body(from, bytes, at) for pieces of segments, which lie `at` bytes
-/// behind the first in their order.
+/// after the first in their order.
 static void forPieces(int32_t threads, const Segments &from, int64_t unit,
                       auto &&body) {
   std::vector<int64_t> at(from.list.size());
@@ -192,7 +192,7 @@ Array<uint32_t> piko::rt::pairStarts(Memory &memory, const Items &items) {
   Array<uint32_t> starts(memory, items.count + 1);
   int64_t item = 0;
   for (int64_t k = 0; k < items.pairCount; ++k)
-    if (items.pairs[k] & PIKOIR_FIRST_CELL)
+    if (items.pairs[k] & PIKOIR_FIRST_BUCKET)
       starts[item++] = static_cast<uint32_t>(k);
   // Of a stream without any pair, all begin and end at 0.
   std::fill(starts.data() + item, starts.data() + items.count + 1,
@@ -234,7 +234,7 @@ public:
         size_(p.records[p.stages[edge.consumer].record].size),
         records_(collect(kernel_, port_, &PortLogs::records)),
         region_(records_, size_),
-        cells_(collect(kernel_, port_, &PortLogs::cells)),
+        buckets_(collect(kernel_, port_, &PortLogs::buckets)),
         ordinals_(collect(kernel_, port_, &PortLogs::ordinals)) {}
 
   void run() {
@@ -299,11 +299,11 @@ private:
                    body);
   }
 
-  /// For each slot, the cells of all its records.
+  /// For each slot, the buckets of all its records.
   Array<uint32_t> countPairs() {
     Array<uint32_t> result(p_.memory, kernel_.slots());
     std::vector<int64_t> entries(kernel_.units.size());
-    for (const Segment &segment : cells_.list)
+    for (const Segment &segment : buckets_.list)
       entries[static_cast<size_t>(segment.unit)] += segment.bytes / 4;
     forUnits([&](int64_t begin, int64_t end) {
       for (int64_t u = begin; u < end; ++u)
@@ -314,7 +314,7 @@ private:
 
   /// Of a unit that logged `left` entries.
   void countPairs(int64_t u, int64_t left, Array<uint32_t> &result) const {
-    Reader reader(cells_, u);
+    Reader reader(buckets_, u);
     uint32_t entry = left > 0 ? reader.read() : 0;
     int64_t end = kernel_.slotBegin(u + 1);
     for (int64_t i = kernel_.slotBegin(u); i < end; ++i) {
@@ -322,8 +322,8 @@ private:
       for (uint32_t r = kernel_.counts[port_][i]; r > 0; --r)
         do {
           ++pairs;
-          entry = --left > 0 ? reader.read() : PIKOIR_FIRST_CELL;
-        } while (!(entry & PIKOIR_FIRST_CELL));
+          entry = --left > 0 ? reader.read() : PIKOIR_FIRST_BUCKET;
+        } while (!(entry & PIKOIR_FIRST_BUCKET));
       result[i] = pairs;
     }
   }
@@ -331,25 +331,25 @@ private:
   void gatherUnits(int64_t begin, int64_t end) {
     Readers from{{records_, begin},
                  {records_, begin, region_, size_},
-                 {cells_, begin},
+                 {buckets_, begin},
                  {ordinals_, begin}};
     for (int64_t u = begin; u < end; ++u) {
-      int64_t cell = kernel_.units[u].cell_begin;
+      int64_t bucket = kernel_.units[u].bucket_begin;
       int64_t unitEnd = kernel_.slotBegin(u + 1);
       for (int64_t i = kernel_.slotBegin(u); i < unitEnd; ++i)
         if (kernel_.counts[port_][i] > 0)
-          gatherSlot(i, cell, from);
+          gatherSlot(i, bucket, from);
     }
   }
 
   struct Readers {
     Reader records;
     IndexReader places;
-    Reader cells, ordinals;
+    Reader buckets, ordinals;
   };
 
-  /// `cell` is the slot's, or one before it.
-  void gatherSlot(int64_t i, int64_t &cell, Readers &from) {
+  /// `bucket` is the slot's, or one before it.
+  void gatherSlot(int64_t i, int64_t &bucket, Readers &from) {
     uint32_t count = kernel_.counts[port_][i];
     int64_t rank = rankOf(i);
     int64_t at = starts_[rank];
@@ -361,23 +361,23 @@ private:
       int64_t begin = pairStarts_[rank];
       int64_t end = rank + 1 < pairStarts_.size() ? pairStarts_[rank + 1]
                                                   : stream_.pairCount;
-      from.cells.read(
+      from.buckets.read(
           reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + begin),
           (end - begin) * 4);
     } else if (stream_.pairStorage) {
-      from.cells.read(
+      from.buckets.read(
           reinterpret_cast<uint8_t *>(stream_.pairStorage.data() + at),
           int64_t(count) * 4);
     }
     if (!edge_.keyed())
       return;
-    while (!from_.collects() && kernel_.offsets[cell + 1] <= i)
-      ++cell;
+    while (!from_.collects() && kernel_.offsets[bucket + 1] <= i)
+      ++bucket;
     for (uint32_t r = 0; r < count; ++r)
-      writeKey(at + r, i, cell, from.ordinals.read());
+      writeKey(at + r, i, bucket, from.ordinals.read());
   }
 
-  void writeKey(int64_t to, int64_t slot, int64_t cell, uint32_t ordinal) {
+  void writeKey(int64_t to, int64_t slot, int64_t bucket, uint32_t ordinal) {
     uint64_t *key = &stream_.keys.words[to * stream_.keys.width];
     if (from_.collects()) { // a new lineage
       key[0] = uint64_t(from_.root) << 32 | kernel_.launch;
@@ -387,7 +387,7 @@ private:
     int64_t item = kernel_.order ? kernel_.order[slot] : slot;
     for (int32_t w = 0; w < kernel_.keys.width; ++w)
       key[w] = kernel_.keys.word(item, w);
-    key[kernel_.keys.width] = static_cast<uint64_t>(cell) << 32 | ordinal;
+    key[kernel_.keys.width] = static_cast<uint64_t>(bucket) << 32 | ordinal;
   }
 
   pikort_pipeline &p_;
@@ -399,7 +399,7 @@ private:
   int64_t size_;
   Segments records_;
   Region region_;
-  Segments cells_, ordinals_;
+  Segments buckets_, ordinals_;
   Array<uint32_t> starts_, pairStarts_;
 };
 
@@ -417,20 +417,20 @@ static void releasePort(Kernel &kernel, size_t port) {
     kernel.clear();
 }
 
-/// The cells that a kernel's port logged, in unit order.
-static void concatenateCells(pikort_pipeline &p, Kernel &kernel, size_t port,
-                             Stream &stream) {
-  Segments cells = collect(kernel, port, &PortLogs::cells);
-  stream.pairCount = cells.bytes / 4;
+/// The buckets that a kernel's port logged, in unit order.
+static void concatenateBuckets(pikort_pipeline &p, Kernel &kernel, size_t port,
+                               Stream &stream) {
+  Segments buckets = collect(kernel, port, &PortLogs::buckets);
+  stream.pairCount = buckets.bytes / 4;
   checkCount(p.stages[kernel.stage], stream.pairCount);
-  if (cells.list.size() == 1) {
-    stream.pairs = reinterpret_cast<const uint32_t *>(cells.list[0].data);
-    keepBlocks(kernel, port, &PortLogs::cells, stream);
+  if (buckets.list.size() == 1) {
+    stream.pairs = reinterpret_cast<const uint32_t *>(buckets.list[0].data);
+    keepBlocks(kernel, port, &PortLogs::buckets, stream);
     return;
   }
   stream.pairStorage = Array<uint32_t>(p.memory, stream.pairCount);
   stream.pairs = stream.pairStorage.data();
-  concatenate(p.threads, cells,
+  concatenate(p.threads, buckets,
               reinterpret_cast<uint8_t *>(stream.pairStorage.data()));
 }
 
@@ -450,7 +450,7 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
                                             ": expected the bins of source " +
                                             std::to_string(index) +
                                             " to be assigned before"};
-    concatenateCells(p, kernel, 0, stream);
+    concatenateBuckets(p, kernel, 0, stream);
     releasePort(kernel, 0);
   }
   return stream;
@@ -474,7 +474,7 @@ static Stream countRecords(pikort_pipeline &p, const Edge &edge) {
                  p.records[to.record].size;
   checkCount(to, stream.count);
   if (byPosition(p, edge) && to.placed())
-    stream.pairCount = collect(kernel, port, &PortLogs::cells).bytes / 4;
+    stream.pairCount = collect(kernel, port, &PortLogs::buckets).bytes / 4;
   checkCount(to, stream.pairCount);
   return stream;
 }
@@ -516,7 +516,7 @@ Stream piko::rt::gatherEdge(pikort_pipeline &p, const Edge &edge) {
     PositionGather(p, edge, stream).run();
   } else {
     if (to.placed())
-      concatenateCells(p, kernel, port, stream);
+      concatenateBuckets(p, kernel, port, stream);
     concatenateRecords(p, kernel, port, p.records[to.record].size, stream);
   }
   releasePort(kernel, port);
@@ -529,7 +529,7 @@ PortRecords piko::rt::takePort(pikort_pipeline &p, const Edge &edge) {
   auto port = static_cast<size_t>(edge.port);
   PortRecords result{countRecords(p, edge), {}, {}};
   if (to.placed())
-    concatenateCells(p, kernel, port, result.stream);
+    concatenateBuckets(p, kernel, port, result.stream);
   concatenateRecords(p, kernel, port, p.records[to.record].size, result.stream);
   Segments ordinals = collect(kernel, port, &PortLogs::ordinals);
   result.ordinals = Array<uint32_t>(p.memory, ordinals.bytes / 4);

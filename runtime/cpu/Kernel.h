@@ -5,16 +5,16 @@
 // from its end until its consumers have gathered what it emitted.
 //
 //   begin:  gather each input edge into a Stream, merge them (Join.cpp),
-//           bin the items (Cells.cpp), cut the positions into units.
-//   loop:   each open unit has a lane, which logs records and cells
+//           bin the items (Buckets.cpp), cut the positions into units.
+//   loop:   each open unit has a lane, which logs records and buckets
 //           (Writer.cpp).
 //   end:    the input goes; logs and lineage stay until they are gathered.
 //
 // An *item* is a primitive of the stage's input, in lineage order. A *pair* is
-// an item in one of its cells, numbered in (item, cell) order. A *position* is
-// a pair, numbered in (cell, item) order: the order of processing. A *slot* is
-// what lies between two calls of pikoir_next: a position, or, where Process
-// takes a list, a call.
+// an item in one of its buckets, numbered in (item, bucket) order. A *position*
+// is a pair, numbered in (bucket, item) order: the order of processing. A
+// *slot* is what lies between two calls of pikoir_next: a position, or, where
+// Process takes a list, a call.
 //
 //===----------------------------------------------------------------------===//
 
@@ -62,10 +62,10 @@ struct LocalBin {
   int64_t received = 0; ///< Over all bins of this run.
 };
 
-/// The three logs of a port. Cells are uint32, the first of each record with
-/// PIKOIR_FIRST_CELL; ordinals are uint32, one for each kept record.
+/// The three logs of a port. Buckets are uint32, the first of each record with
+/// PIKOIR_FIRST_BUCKET; ordinals are uint32, one for each kept record.
 struct PortLogs {
-  Log records, cells, ordinals;
+  Log records, buckets, ordinals;
   std::vector<uint8_t> scratch;
   uint8_t *scratchRecord = nullptr; ///< In it, aligned: room for records.
   uint32_t *countsEnd = nullptr;
@@ -75,15 +75,15 @@ struct PortLogs {
 
   void clear() {
     records.clear();
-    cells.clear();
+    buckets.clear();
     ordinals.clear();
   }
 };
 
-/// In a source's log: the primitive has no cell.
-constexpr uint32_t noCell = 0xffffffffu;
+/// In a source's log: the primitive has no bucket.
+constexpr uint32_t noBucket = 0xffffffffu;
 
-struct Deferred; // Defer.cpp
+struct Reordered; // Reorder.cpp
 
 /// Memory of a call of Process: last in, first out. A mark is the number of
 /// bytes below it, over all blocks.
@@ -117,12 +117,12 @@ struct alignas(64) Lane : pikoir_writer {
   int64_t opened = 0;  ///< The unit, in ticks.
   int64_t busy = 0;    ///< Ticks of all units of this run.
   /// In a serial launch: where the number of what was emitted goes at the end
-  /// of the next slot, and behind the unit's last.
+  /// of the next slot, and after the unit's last.
   uint32_t *slotEnd = nullptr, *slotLimit = nullptr;
   ScratchStack scratch;
-  std::deque<PixelTile> tiles;        ///< Of the images of which a run has any.
-  pikoir_tile untiled{};              ///< The image, if memory is refused.
-  std::unique_ptr<Deferred> deferred; ///< If there were any.
+  std::deque<PixelTile> tiles; ///< Of the images of which a run has any.
+  pikoir_tile untiled{};       ///< The image, if memory is refused.
+  std::unique_ptr<Reordered> reordered; ///< If there were any.
   std::vector<pikoir_private> privates; ///< For each reduction of the stage.
   AutotunerThread tuning;               ///< Of the open unit.
   bool reduces = false;                 ///< Some unit of this launch asked.
@@ -146,7 +146,7 @@ struct Keys {
   }
 };
 
-/// Items in lineage order, with the cells of each.
+/// Items in lineage order, with the buckets of each.
 struct Items {
   const uint8_t *items = nullptr;
   int64_t count = 0;
@@ -204,7 +204,7 @@ public:
 private:
   struct alignas(64) Cursor { // on a line of its own
     std::atomic<int64_t> next = 0;
-    int64_t end = 0; ///< Behind the last unit.
+    int64_t end = 0; ///< After the last unit.
   };
   Cursor &of(int64_t owner) { return cursors_[owner + 2]; }
 
@@ -273,8 +273,8 @@ struct Kernel {
     if (units.empty())
       return 0;
     if (unit == static_cast<int64_t>(units.size()))
-      return calls ? units.back().cell_end : units.back().end;
-    return calls ? units[unit].cell_begin : units[unit].begin;
+      return calls ? units.back().bucket_end : units.back().end;
+    return calls ? units[unit].bucket_begin : units[unit].begin;
   }
   int64_t slots() const {
     return slotBegin(static_cast<int64_t>(units.size()));
@@ -295,11 +295,12 @@ void badCall(const Lane &lane, BadCall which);
 /// Reports that `bytes` were refused, to the lane's stage or to another one.
 void outOfMemory(const Lane &lane, int64_t bytes, int32_t stage = -1);
 
-// --- Defer.cpp --------------------------------------------------------------
+// --- Reorder.cpp
+// --------------------------------------------------------------
 
 /// What pikoir_append and pikoir_place do in iterations.
-uint8_t *deferAppend(Lane &lane, int32_t port);
-void deferPlace(Lane &lane, int32_t port, int64_t cell);
+uint8_t *reorderAppend(Lane &lane, int32_t port);
+void reorderPlace(Lane &lane, int32_t port, int64_t bucket);
 
 // --- Local.cpp --------------------------------------------------------------
 
@@ -351,7 +352,8 @@ Places mergePlaces(pikort_pipeline &p, std::vector<Stream> &streams);
 Stream placeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
                     Places places, const Stage &stage);
 
-// --- Cells.cpp --------------------------------------------------------------
+// --- Buckets.cpp
+// --------------------------------------------------------------
 
 /// Sets the kernel's positions, order and offsets, and rank if `rankNeeded`.
 void binItems(pikort_pipeline &p, const Stage &stage, Kernel &kernel,

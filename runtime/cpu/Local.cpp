@@ -2,7 +2,7 @@
 //===- Local.cpp - Stages that run in the kernel of their producer --------===//
 //
 // The records of a local edge lie in one block of the lane, which grows as
-// needed and serves bin after bin. The stage behind the edge has lanes of its
+// needed and serves bin after bin. The stage after the edge has lanes of its
 // own, for what it emits: a unit is one of the host's, with a slot for each bin
 // in it.
 //
@@ -22,7 +22,8 @@ static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
   kernel.clear();
   int64_t slots = 0;
   for (const pikoir_unit &unit : host.units) {
-    int64_t bins = unit.cell_end - unit.cell_begin; // or calls, which are more
+    int64_t bins =
+        unit.bucket_end - unit.bucket_begin; // or calls, which are more
     kernel.units.push_back({0, 0, slots, slots + bins, 0});
     slots += bins;
   }

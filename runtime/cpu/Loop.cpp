@@ -11,27 +11,29 @@
 
 using namespace piko::rt;
 
-Loop::Loop(pikort_pipeline &p, const LoopShape &shape) : p_(p), shape_(shape) {
+StageLoop::StageLoop(pikort_pipeline &p, const LoopShape &shape)
+    : p_(p), shape_(shape) {
   for (int32_t s : shape.stages)
     for (int32_t e : p.stages[s].outputs)
       if (e >= 0 && !p.edges[e].insideLoop)
         exits_.push_back(e);
 }
 
-Edge &Loop::exitTo(const Edge &edge) const {
+Edge &StageLoop::exitTo(const Edge &edge) const {
   size_t i = 0;
   while (p_.edges[exits_[i]].consumer != edge.consumer)
     ++i;
   return p_.edges[exits_[i]];
 }
 
-std::unique_ptr<Loop> Loop::make(pikort_pipeline &p, const LoopShape &shape) {
+std::unique_ptr<StageLoop> StageLoop::make(pikort_pipeline &p,
+                                           const LoopShape &shape) {
   if (shape.ordered)
     return std::make_unique<StackLoop>(p, shape);
   return std::make_unique<WaveLoop>(p, shape);
 }
 
-void Loop::start(bool fromOutside) {
+void StageLoop::start(bool fromOutside) {
   entries_.clear();
   places_.clear();
   entryCount_ = 0;
@@ -64,18 +66,18 @@ void Loop::start(bool fromOutside) {
   begin();
 }
 
-void Loop::writeKey(const Edge &edge, uint64_t *key, int64_t entry,
-                    uint64_t place) const {
+void StageLoop::writeKey(const Edge &edge, uint64_t *key, int64_t entry,
+                         uint64_t place) const {
   for (int32_t w = 0; w < edge.keyWidth; ++w)
     key[w] = w < shape_.keyWidth    ? keys_[entry * shape_.keyWidth + w]
              : w == shape_.keyWidth ? place
                                     : 0;
 }
 
-void Loop::failHops(const Stage &stage, int64_t cell,
-                    const uint8_t *record) const {
+void StageLoop::failHops(const Stage &stage, int64_t bucket,
+                         const uint8_t *record) const {
   std::string text = "stage " + quoted(stage.name) + ", bin " +
-                     std::to_string(cell / stage.tiles) +
+                     std::to_string(bucket / stage.tiles) +
                      ": a loop did not end within " +
                      std::to_string(p_.loopLimit) + " hops";
   if (Checker *checker = checkerOf(p_))

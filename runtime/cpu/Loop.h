@@ -23,11 +23,12 @@
 
 namespace piko::rt {
 
-class Loop {
+class StageLoop {
 public:
-  Loop(pikort_pipeline &p, const LoopShape &shape);
-  static std::unique_ptr<Loop> make(pikort_pipeline &p, const LoopShape &shape);
-  virtual ~Loop() = default;
+  StageLoop(pikort_pipeline &p, const LoopShape &shape);
+  static std::unique_ptr<StageLoop> make(pikort_pipeline &p,
+                                         const LoopShape &shape);
+  virtual ~StageLoop() = default;
 
   /// Takes what has come into the loop's stages.
   void start(bool fromOutside);
@@ -63,7 +64,7 @@ protected:
   /// To where what leaves by an edge goes: the first edge to the same stage,
   /// which gets all in order.
   Edge &exitTo(const Edge &edge) const;
-  [[noreturn]] void failHops(const Stage &stage, int64_t cell,
+  [[noreturn]] void failHops(const Stage &stage, int64_t bucket,
                              const uint8_t *record) const;
 
   pikort_pipeline &p_;

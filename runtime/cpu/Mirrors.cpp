@@ -151,7 +151,7 @@ void piko::rt::refillMirrors(pikort_pipeline &p) {
   beginMirrors(p, /*isFrame=*/false);
 }
 
-// --- Behind a run -----------------------------------------------------------
+// --- After a run -----------------------------------------------------------
 
 /// What kernels have written, to what was bound, goes there. A device that
 /// failed may have taken its memory along.

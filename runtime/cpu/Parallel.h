@@ -27,7 +27,7 @@ void parallelFor(int32_t threads, int64_t n, const Body &body) {
       body(i);
     return;
   }
-  // A dynamic loop of Debian's libomp takes a microsecond for each turn.
+  // A dynamic loop of Debian's libomp takes a microsecond for each iteration.
   std::atomic<int64_t> next = 0;
 #pragma omp parallel num_threads(count)
   for (int64_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < n;)

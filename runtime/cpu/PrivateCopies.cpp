@@ -125,9 +125,9 @@ static void combine(const State &state, const Reduction &reduction,
     while (run < end && copy.dirty[run] != 0)
       copy.dirty[run++] = 0;
     int64_t begin = first << reduction.runShift;
-    int64_t behind = std::min(run << reduction.runShift, copies.records);
+    int64_t after = std::min(run << reduction.runShift, copies.records);
     reduction.combine(state.view.data + begin * size, copy.data + begin * size,
-                      behind - begin);
+                      after - begin);
   }
 }
 

@@ -122,7 +122,7 @@ prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
   openLanes(p, kernel);
 }
 
-/// Whether a kernel changes state: its stage, or one behind it.
+/// Whether a kernel changes state: its stage, or one after it.
 static bool writesState(const pikort_pipeline &p, const Kernel &kernel) {
   return p.stages[kernel.stage].writes() ||
          std::any_of(p.stages.begin(), p.stages.end(), [&](const Stage &stage) {

@@ -11,7 +11,8 @@ using namespace piko::rt;
 /// Who runs all units.
 static constexpr int64_t thread = 0;
 
-// --- Few pairs in many cells ------------------------------------------------
+// --- Few pairs in many buckets
+// ------------------------------------------------
 
 void PairOrder::read(const Items &input) {
   entries_.clear();
@@ -26,10 +27,10 @@ void PairOrder::read(const Items &input) {
       item += pair >> 31;
       items_.push_back(item);
     }
-    if (pair == noCell)
+    if (pair == noBucket)
       continue;
     uint64_t entry =
-        uint64_t(pair & ~PIKOIR_FIRST_CELL) << 32 | static_cast<uint32_t>(k);
+        uint64_t(pair & ~PIKOIR_FIRST_BUCKET) << 32 | static_cast<uint32_t>(k);
     sorted_ &= entry > last || entries_.empty();
     last = entry;
     entries_.push_back(entry);
@@ -45,28 +46,28 @@ bool piko::rt::isSorted(const Items &input) {
   uint32_t last = 0;
   for (int64_t k = 0; k < input.pairCount; ++k) {
     uint32_t pair = input.pairs[k];
-    uint32_t cell = pair == noCell ? last : pair & ~PIKOIR_FIRST_CELL;
-    if (cell < last)
+    uint32_t bucket = pair == noBucket ? last : pair & ~PIKOIR_FIRST_BUCKET;
+    if (bucket < last)
       return false;
-    last = cell;
+    last = bucket;
   }
   return true;
 }
 
 void piko::rt::cutRuns(const std::vector<uint64_t> &entries, int64_t *offsets,
                        std::vector<pikoir_unit> &runs) {
-  // To pass by a cell takes less than to open another unit.
+  // To pass by a bucket takes less than to open another unit.
   constexpr int64_t near = 16;
   auto count = static_cast<int64_t>(entries.size());
   for (int64_t i = 0; i < count; ++i) {
-    int64_t cell = PairOrder::cellOf(entries[static_cast<size_t>(i)]);
-    int64_t end = runs.empty() ? -near : runs.back().cell_end;
-    if (cell >= end + near)
-      runs.push_back({cell, cell, i, i, thread});
+    int64_t bucket = PairOrder::bucketOf(entries[static_cast<size_t>(i)]);
+    int64_t end = runs.empty() ? -near : runs.back().bucket_end;
+    if (bucket >= end + near)
+      runs.push_back({bucket, bucket, i, i, thread});
     pikoir_unit &run = runs.back();
-    for (; run.cell_end <= cell; ++run.cell_end)
-      offsets[run.cell_end] = i;
-    offsets[run.cell_end] = run.end = i + 1;
+    for (; run.bucket_end <= bucket; ++run.bucket_end)
+      offsets[run.bucket_end] = i;
+    offsets[run.bucket_end] = run.end = i + 1;
   }
 }
 
@@ -74,8 +75,9 @@ void piko::rt::cutRuns(const std::vector<uint64_t> &entries, int64_t *offsets,
 
 Serial::Serial(pikort_pipeline &p, Kernel &kernel)
     : p_(p), kernel_(kernel), stage_(p.stages[kernel.stage]),
-      lane_(prepareSerialLane(p, kernel)), offsets_(p.memory, stage_.cells + 1),
-      ports_(stage_.outputs.size()), pieces_(stage_.outputs.size()) {}
+      lane_(prepareSerialLane(p, kernel)),
+      offsets_(p.memory, stage_.buckets + 1), ports_(stage_.outputs.size()),
+      pieces_(stage_.outputs.size()) {}
 
 bool Serial::takes(const pikort_pipeline &p, Kernel &kernel, int64_t count) {
   constexpr double worthThreads = 0.2; // milliseconds
@@ -139,13 +141,13 @@ void Serial::begin(const Items &input) {
 }
 
 void Serial::binPairs(const Items &input) {
-  if (input.pairCount == 1 && *input.pairs != noCell)
-    return binPair(*input.pairs & ~PIKOIR_FIRST_CELL);
+  if (input.pairCount == 1 && *input.pairs != noBucket)
+    return binPair(*input.pairs & ~PIKOIR_FIRST_BUCKET);
   pairs_.read(input);
   const std::vector<uint64_t> &entries = pairs_.entries();
   auto count = static_cast<int64_t>(entries.size());
   kernel_.positions = count;
-  if (pairs_.isSorted() || stage_.cells > 8 * count) {
+  if (pairs_.isSorted() || stage_.buckets > 8 * count) {
     pairs_.sort();
     bool identity =
         pairs_.isSorted() && input.onePairEach() && count == input.count;
@@ -155,41 +157,41 @@ void Serial::binPairs(const Items &input) {
     return;
   }
   countPairs();
-  kernel_.units.push_back({0, stage_.cells, 0, count, thread});
+  kernel_.units.push_back({0, stage_.buckets, 0, count, thread});
 }
 
-/// The order of many pairs in few cells.
+/// The order of many pairs in few buckets.
 void Serial::countPairs() {
-  int64_t *next = offsets_.data() + 1; // of each cell, in the end its end
-  std::fill_n(offsets_.data(), stage_.cells + 1, 0);
+  int64_t *next = offsets_.data() + 1; // of each bucket, in the end its end
+  std::fill_n(offsets_.data(), stage_.buckets + 1, 0);
   for (uint64_t entry : pairs_.entries())
-    ++next[PairOrder::cellOf(entry)];
+    ++next[PairOrder::bucketOf(entry)];
   int64_t sum = 0;
-  for (int64_t cell = 0; cell < stage_.cells; ++cell)
-    sum += std::exchange(next[cell], sum);
+  for (int64_t bucket = 0; bucket < stage_.buckets; ++bucket)
+    sum += std::exchange(next[bucket], sum);
   order_.resize(pairs_.entries().size());
   for (uint64_t entry : pairs_.entries())
-    order_[static_cast<size_t>(next[PairOrder::cellOf(entry)]++)] =
+    order_[static_cast<size_t>(next[PairOrder::bucketOf(entry)]++)] =
         pairs_.itemOf(PairOrder::pairOf(entry));
 }
 
 /// The same for a single pair.
-void Serial::binPair(int64_t cell) {
+void Serial::binPair(int64_t bucket) {
   kernel_.positions = 1;
-  offsets_[cell] = 0;
-  offsets_[cell + 1] = 1;
-  kernel_.units.push_back({cell, cell + 1, 0, 1, thread});
+  offsets_[bucket] = 0;
+  offsets_[bucket + 1] = 1;
+  kernel_.units.push_back({bucket, bucket + 1, 0, 1, thread});
 }
 
-/// One unit of all calls takes the place of runs of cells.
+/// One unit of all calls takes the place of runs of buckets.
 void Serial::makeCalls() {
   for (const pikoir_unit &run : kernel_.units)
-    for (int64_t cell = run.cell_begin; cell < run.cell_end; ++cell) {
-      int64_t batch = stage_.scheduleOf(cell).batch;
-      int64_t end = offsets_[cell + 1];
-      for (int64_t i = offsets_[cell]; i < end;) {
+    for (int64_t bucket = run.bucket_begin; bucket < run.bucket_end; ++bucket) {
+      int64_t batch = stage_.scheduleOf(bucket).batch;
+      int64_t end = offsets_[bucket + 1];
+      for (int64_t i = offsets_[bucket]; i < end;) {
         int64_t next = batch > 0 ? std::min(i + batch, end) : end;
-        calls_.push_back({cell, i, next});
+        calls_.push_back({bucket, i, next});
         i = next;
       }
     }
@@ -210,16 +212,16 @@ pikoir_writer *Serial::open(int64_t unit) {
   if (kernel_.tuner)
     lane_.mappings = kernel_.tuner->getCurrent();
   lane_.slotLimit =
-      slotEnds_.data() + (stage_.takesList() ? opened.cell_end : opened.end);
+      slotEnds_.data() + (stage_.takesList() ? opened.bucket_end : opened.end);
   for (pikoir_port &port : lane_.portStorage)
-    port.last_cell = INT64_MAX;
+    port.last_bucket = INT64_MAX;
   return &lane_;
 }
 
 // --- What it emitted --------------------------------------------------------
 
 static bool isInOnePiece(const PortLogs &logs) {
-  return logs.records.segments.empty() && logs.cells.segments.empty() &&
+  return logs.records.segments.empty() && logs.buckets.segments.empty() &&
          logs.ordinals.segments.empty();
 }
 
@@ -234,10 +236,10 @@ void Serial::rewind(size_t port) {
   PortLogs &logs = lane_.logs[port];
   pikoir_port &out = lane_.portStorage[port];
   if (!isInOnePiece(logs)) [[unlikely]]
-    for (Log *log : {&logs.records, &logs.cells, &logs.ordinals})
+    for (Log *log : {&logs.records, &logs.buckets, &logs.ordinals})
       dropPieces(*log);
   out.cursor = logs.records.start;
-  out.cell_cursor = reinterpret_cast<uint32_t *>(logs.cells.start);
+  out.bucket_cursor = reinterpret_cast<uint32_t *>(logs.buckets.start);
   out.ordinal_cursor = reinterpret_cast<uint32_t *>(logs.ordinals.start);
   out.emitted = out.kept = 0;
 }
@@ -257,16 +259,16 @@ void Serial::collect(size_t port) {
   const PortLogs &logs = lane_.logs[port];
   const pikoir_port &out = lane_.portStorage[port];
   Emitted &emitted = ports_[port];
-  emitted.count = out.cells != 0 ? out.kept : out.emitted;
-  const uint8_t *pairs = logs.cells.start, *numbers = logs.ordinals.start;
+  emitted.count = out.buckets != 0 ? out.kept : out.emitted;
+  const uint8_t *pairs = logs.buckets.start, *numbers = logs.ordinals.start;
   emitted.items = logs.records.start;
   emitted.pairCount =
-      out.cell_cursor - reinterpret_cast<const uint32_t *>(pairs);
+      out.bucket_cursor - reinterpret_cast<const uint32_t *>(pairs);
   if (!isInOnePiece(logs)) [[unlikely]] {
     Pieces &pieces = pieces_[port];
     emitted.items = join(p_.memory, logs.records, out.cursor, pieces.records);
-    pairs = join(p_.memory, logs.cells, out.cell_cursor, pieces.cells);
-    emitted.pairCount = pieces.cells.size() / 4;
+    pairs = join(p_.memory, logs.buckets, out.bucket_cursor, pieces.buckets);
+    emitted.pairCount = pieces.buckets.size() / 4;
     numbers =
         join(p_.memory, logs.ordinals, out.ordinal_cursor, pieces.ordinals);
   }

@@ -4,10 +4,10 @@
 // A cycle may hold little for a long time. To spread that over threads, to
 // count it in all bins and to join what they emitted would take longer than its
 // work. A serial launch takes its input where it lies, on the calling thread,
-// in the order of processing: cells that hold something, and the items in each.
-// One lane logs what is emitted, in that order and with its number, until the
-// cycle has taken it. So a launch costs what is in it, however many bins and
-// threads there are, and allocates nothing that the one before it has not.
+// in the order of processing: buckets that hold something, and the items in
+// each. One lane logs what is emitted, in that order and with its number, until
+// the cycle has taken it. So a launch costs what is in it, however many bins
+// and threads there are, and allocates nothing that the one before it has not.
 //
 //===----------------------------------------------------------------------===//
 
@@ -18,11 +18,12 @@
 
 namespace piko::rt {
 
-/// Pairs by cell, for what is little in comparison with the number of cells.
+/// Pairs by bucket, for what is little in comparison with the number of
+/// buckets.
 class PairOrder {
 public:
-  /// The entries of one that is sorted: the cell and the pair's number.
-  static int64_t cellOf(uint64_t entry) {
+  /// The entries of one that is sorted: the bucket and the pair's number.
+  static int64_t bucketOf(uint64_t entry) {
     return static_cast<int64_t>(entry >> 32);
   }
   static uint32_t pairOf(uint64_t entry) {
@@ -48,8 +49,8 @@ private:
 /// Whether pairs are in the order of processing.
 bool isSorted(const Items &input);
 
-/// Cuts sorted pairs into runs of neighbouring cells, and sets the first
-/// position of each of these cells and of the one behind.
+/// Cuts sorted pairs into runs of neighbouring buckets, and sets the first
+/// position of each of these buckets and of the one after.
 void cutRuns(const std::vector<uint64_t> &entries, int64_t *offsets,
              std::vector<pikoir_unit> &runs);
 
@@ -99,11 +100,11 @@ public:
 private:
   /// Of a port: what is in several segments of a log, in one piece.
   struct Pieces {
-    Growing<uint8_t> records, cells, ordinals;
+    Growing<uint8_t> records, buckets, ordinals;
   };
 
   void binPairs(const Items &input);
-  void binPair(int64_t cell);
+  void binPair(int64_t bucket);
   void countPairs();
   void makeCalls();
   void rewind(size_t port);

@@ -10,7 +10,7 @@ using namespace piko::rt;
 void StackLoop::begin() {
   stack_.shrink(0);
   records_.shrink(0);
-  cells_.shrink(0);
+  buckets_.shrink(0);
   nextEntry_ = 0;
   left_ = 0;
   order_ = Array<Entry>(p_.memory, entryCount_);
@@ -26,21 +26,21 @@ void StackLoop::begin() {
 }
 
 void StackLoop::push(const Waiting &waiting, const uint8_t *record,
-                     const uint32_t *cells) {
+                     const uint32_t *buckets) {
   records_.append(p_.memory, record, recordSize(p_.stages[waiting.stage]));
-  cells_.append(p_.memory, cells, waiting.cells);
+  buckets_.append(p_.memory, buckets, waiting.buckets);
   *stack_.extend(p_.memory, 1) = waiting;
 }
 
-/// Pushes an item in each of its cells, the last one first.
-void StackLoop::pushCells(int32_t stage, int64_t hops, const uint8_t *record,
-                          const uint32_t *cells, int64_t count) {
+/// Pushes an item in each of its buckets, the last one first.
+void StackLoop::pushBuckets(int32_t stage, int64_t hops, const uint8_t *record,
+                            const uint32_t *buckets, int64_t count) {
   if (!p_.stages[stage].placed())
     return push({-1, stage, hops, 0}, record, nullptr);
   while (count-- > 0)
-    if (uint32_t cell = cells[count]; cell != noCell) {
-      cell |= PIKOIR_FIRST_CELL;
-      push({-1, stage, hops, 1}, record, &cell);
+    if (uint32_t bucket = buckets[count]; bucket != noBucket) {
+      bucket |= PIKOIR_FIRST_BUCKET;
+      push({-1, stage, hops, 1}, record, &bucket);
     }
 }
 
@@ -48,9 +48,9 @@ Items StackLoop::pop() {
   Waiting top = stack_[stack_.size() - 1];
   stack_.shrink(stack_.size() - 1);
   records_.shrink(records_.size() - recordSize(p_.stages[top.stage]));
-  cells_.shrink(cells_.size() - top.cells);
-  return {records_.data() + records_.size(), 1, cells_.data() + cells_.size(),
-          top.cells};
+  buckets_.shrink(buckets_.size() - top.buckets);
+  return {records_.data() + records_.size(), 1,
+          buckets_.data() + buckets_.size(), top.buckets};
 }
 
 /// The top of the stack leaves the loop.
@@ -79,8 +79,8 @@ void StackLoop::pushEntry(const Entry &entry) {
   const Array<uint32_t> &starts = starts_[entry.member];
   int64_t begin = starts ? starts[entry.item] : 0;
   int64_t end = starts ? starts[entry.item + 1] : 0;
-  pushCells(stage, 0, stream.item(entry.item, recordSize(p_.stages[stage])),
-            stream.pairs + begin, end - begin);
+  pushBuckets(stage, 0, stream.item(entry.item, recordSize(p_.stages[stage])),
+              stream.pairs + begin, end - begin);
 }
 
 int32_t StackLoop::next() {
@@ -91,8 +91,8 @@ int32_t StackLoop::next() {
         const Stage &stage = p_.stages[running_.stage];
         if (running_.hops > p_.loopLimit)
           failHops(stage,
-                   running_.cells
-                       ? cells_[cells_.size() - 1] & ~PIKOIR_FIRST_CELL
+                   running_.buckets
+                       ? buckets_[buckets_.size() - 1] & ~PIKOIR_FIRST_BUCKET
                        : 0,
                    records_.data() + records_.size() - recordSize(stage));
         return running_.stage;
@@ -114,8 +114,8 @@ Items StackLoop::serialInput() {
   input_.shrink(0); // in its own memory, a record is aligned
   input_.append(p_.memory, input.items, size);
   input.items = input_.data();
-  inputCell_ = input.pairCount > 0 ? *input.pairs : 0;
-  input.pairs = &inputCell_;
+  inputBucket_ = input.pairCount > 0 ? *input.pairs : 0;
+  input.pairs = &inputBucket_;
   return input;
 }
 
@@ -148,12 +148,12 @@ void StackLoop::pushLast(Tail &tail) {
   const uint8_t *record = emitted.items + --tail.count * recordSize(to);
   int64_t end = tail.pairs;
   if (to.placed())
-    while (!(emitted.pairs[--tail.pairs] & PIKOIR_FIRST_CELL))
+    while (!(emitted.pairs[--tail.pairs] & PIKOIR_FIRST_BUCKET))
       ;
-  const uint32_t *cells = emitted.pairs + tail.pairs;
+  const uint32_t *buckets = emitted.pairs + tail.pairs;
   if (edge.insideLoop)
-    pushCells(edge.consumer, running_.hops + 1, record, cells,
-              end - tail.pairs);
+    pushBuckets(edge.consumer, running_.hops + 1, record, buckets,
+                end - tail.pairs);
   else
-    push({tail.edge, edge.consumer, 0, end - tail.pairs}, record, cells);
+    push({tail.edge, edge.consumer, 0, end - tail.pairs}, record, buckets);
 }

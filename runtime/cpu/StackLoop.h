@@ -8,9 +8,9 @@
 
 namespace piko::rt {
 
-class StackLoop : public Loop {
+class StackLoop : public StageLoop {
 public:
-  StackLoop(pikort_pipeline &p, const LoopShape &shape) : Loop(p, shape) {}
+  StackLoop(pikort_pipeline &p, const LoopShape &shape) : StageLoop(p, shape) {}
   int32_t next() override;
   bool runsSerially(Kernel &) const override { return true; }
   Stream takeInput() override { return {}; } // no launch is another
@@ -19,13 +19,13 @@ public:
   void absorb(Kernel &) override {}
 
 private:
-  /// An item in one of its cells, or, if it leaves the loop, in all. Its record
-  /// and its cells are on stacks of their own.
+  /// An item in one of its buckets, or, if it leaves the loop, in all. Its
+  /// record and its buckets are on stacks of their own.
   struct Waiting {
     int32_t edge; ///< By which it leaves, or -1.
     int32_t stage;
     int64_t hops;
-    int64_t cells;
+    int64_t buckets;
   };
   struct Entry {
     uint32_t member, item;
@@ -39,9 +39,9 @@ private:
 
   void begin() override;
   void push(const Waiting &waiting, const uint8_t *record,
-            const uint32_t *cells);
-  void pushCells(int32_t stage, int64_t hops, const uint8_t *record,
-                 const uint32_t *cells, int64_t count);
+            const uint32_t *buckets);
+  void pushBuckets(int32_t stage, int64_t hops, const uint8_t *record,
+                   const uint32_t *buckets, int64_t count);
   /// Takes the top of the stack.
   Items pop();
   void leave();
@@ -50,10 +50,10 @@ private:
 
   Growing<Waiting> stack_;
   Growing<uint8_t> records_;
-  Growing<uint32_t> cells_;
+  Growing<uint32_t> buckets_;
   Waiting running_{};
   Growing<uint8_t> input_; ///< Its record.
-  uint32_t inputCell_ = 0;
+  uint32_t inputBucket_ = 0;
   std::vector<Tail> tails_;
   Array<Entry> order_;                  ///< Of all entries.
   std::vector<Array<uint32_t>> starts_; ///< Of the pairs of the entries.

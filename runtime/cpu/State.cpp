@@ -204,8 +204,8 @@ const int64_t *pikoir_grid(pikort_pipeline *p, int32_t stage) {
   return p->stages[stage].grid.data();
 }
 
-const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage) {
-  return p->stages[stage].cellGrid.data();
+const int64_t *pikoir_tile_grid(pikort_pipeline *p, int32_t stage) {
+  return p->stages[stage].tileGrid.data();
 }
 
 int32_t pikoir_threads(pikort_pipeline *p) {

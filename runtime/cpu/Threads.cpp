@@ -34,10 +34,10 @@ static bool isNumberList(std::string_view text, int64_t most) {
   while (true) {
     skipSpace();
     int64_t number = 0;
-    auto [behind, error] = std::from_chars(at, end, number);
+    auto [after, error] = std::from_chars(at, end, number);
     if (error != std::errc() || number < 1 || number > most)
       return false;
-    at = behind;
+    at = after;
     skipSpace();
     if (at == end)
       return true;
@@ -133,12 +133,12 @@ static std::string readText(const std::string &path) {
 /// Two numbers with a space between; false where the first is not one.
 static bool readPair(std::string_view text, int64_t &first, int64_t &second) {
   const char *end = text.data() + text.size();
-  auto [behind, error] = std::from_chars(text.data(), end, first);
+  auto [after, error] = std::from_chars(text.data(), end, first);
   if (error != std::errc())
     return false;
-  while (behind != end && *behind == ' ')
-    ++behind;
-  return std::from_chars(behind, end, second).ec == std::errc();
+  while (after != end && *after == ' ')
+    ++after;
+  return std::from_chars(after, end, second).ec == std::errc();
 }
 
 /// Processors of a group itself, or INT32_MAX.

@@ -4,7 +4,7 @@
 // Where the pitch of an image is a multiple of a large power of two, as that of
 // 1024 pixels of 8 bytes, the rows of a bin are in few sets of the first level
 // of the cache, and evict one another (conflict misses). A copy has them one
-// behind the other, in all sets; and what is copied is asked for at once, while
+// after the other, in all sets; and what is copied is asked for at once, while
 // a kernel asks for a row when it comes to it.
 //
 //===----------------------------------------------------------------------===//

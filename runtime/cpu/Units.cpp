@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Units.cpp - Cuts positions into calls and units --------------------===//
 //
-// A unit is what one thread takes at a time: neighbouring cells until there is
-// enough work in them, or a part of a cell that may be split. Where Process
-// takes a list, calls take the place of cells' positions. Schedules say who
-// runs a unit: those of DirectMap have a home, a core that gets neighbours, as
-// many primitives as the others; those of Serialize are the first core's. A
-// core without work takes what others have not begun, so that nobody waits for
-// a core whose primitives take longer. How units are cut, and who runs them, is
-// never seen in a result.
+// A unit is what one thread takes at a time: neighbouring buckets until there
+// is enough work in them, or a part of a bucket that may be split. Where
+// Process takes a list, calls take the place of buckets' positions. Schedules
+// say who runs a unit: those of DirectMap have a home, a core that gets
+// neighbours, as many primitives as the others; those of Serialize are the
+// first core's. A core without work takes what others have not begun, so that
+// nobody waits for a core whose primitives take longer. How units are cut, and
+// who runs them, is never seen in a result.
 //
 //===----------------------------------------------------------------------===//
 
@@ -44,8 +44,8 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
   return std::clamp<int64_t>((share + 15) / 16 * 16, 16, most);
 }
 
-/// Cells or calls in a unit, at most `most`. A block takes one after the other,
-/// so that few in each keep all multiprocessors busy.
+/// Buckets or calls in a unit, at most `most`. A block takes one after the
+/// other, so that few in each keep all multiprocessors busy.
 int64_t mostTogether(const pikort_pipeline &p, int64_t count, int64_t most) {
   if (!p.accelerator)
     return most;
@@ -59,40 +59,41 @@ public:
       : p_(p), stage_(stage), kernel_(kernel), units_(kernel.units),
         offsets_(kernel.offsets.data()) {}
 
-  void cutCells() {
+  void cutBuckets() {
     const BinSchedule &schedule = stage_.scheduleOf(0);
     if (!stage_.binSchedules && schedule.kind == PIKOIR_SERIALIZE)
-      return add(0, stage_.cells, 0, kernel_.positions, firstCore);
+      return add(0, stage_.buckets, 0, kernel_.positions, firstCore);
     int64_t chunk = sizeOf(schedule);
     // What waits for a bin may do much, whatever there is in it.
-    int64_t most = mostTogether(p_, stage_.cells, stage_.hosts ? 16 : 1024);
+    int64_t most = mostTogether(p_, stage_.buckets, stage_.hosts ? 16 : 1024);
     int64_t first = 0; // of the group that is not yet added
     int64_t owner = nobody;
-    auto flush = [&](int64_t cell) {
-      if (first < cell)
-        add(first, cell, offsets_[first], offsets_[cell], owner);
-      first = cell;
+    auto flush = [&](int64_t bucket) {
+      if (first < bucket)
+        add(first, bucket, offsets_[first], offsets_[bucket], owner);
+      first = bucket;
     };
-    for (int64_t cell = 0; cell < stage_.cells; ++cell) {
-      int64_t begin = offsets_[cell], end = offsets_[cell + 1];
-      const BinSchedule &now = stage_.scheduleOf(cell / stage_.tiles);
+    for (int64_t bucket = 0; bucket < stage_.buckets; ++bucket) {
+      int64_t begin = offsets_[bucket], end = offsets_[bucket + 1];
+      const BinSchedule &now = stage_.scheduleOf(bucket / stage_.tiles);
       int64_t nowOwner = ownerOf(now);
       if (owner != nowOwner)
-        flush(cell);
+        flush(bucket);
       owner = nowOwner;
       if (stage_.binSchedules)
         chunk = sizeOf(now);
       if (end - begin > chunk && splits(now)) {
-        flush(cell);
+        flush(bucket);
         for (int64_t i = begin; i < end; i += chunk)
-          add(cell, cell + 1, i, std::min(end, i + chunk), owner);
-        first = cell + 1;
+          add(bucket, bucket + 1, i, std::min(end, i + chunk), owner);
+        first = bucket + 1;
       } else if (now.kind != PIKOIR_SERIALIZE &&
-                 (end - offsets_[first] >= chunk || cell + 1 - first >= most)) {
-        flush(cell + 1);
+                 (end - offsets_[first] >= chunk ||
+                  bucket + 1 - first >= most)) {
+        flush(bucket + 1);
       }
     }
-    flush(stage_.cells);
+    flush(stage_.buckets);
   }
 
   void cutCalls() {
@@ -127,11 +128,11 @@ public:
   }
 
   /// Gives each core neighbouring units of those that are mapped, as many
-  /// positions as the others. A cell counts as well: there may be much to do
+  /// positions as the others. A bucket counts as well: there may be much to do
   /// where there is nothing in it.
   void mapUnits() {
     auto weigh = [](const pikoir_unit &unit) {
-      return unit.end - unit.begin + unit.cell_end - unit.cell_begin;
+      return unit.end - unit.begin + unit.bucket_end - unit.bucket_begin;
     };
     int64_t all = 0, before = 0;
     for (const pikoir_unit &unit : units_)
@@ -164,11 +165,11 @@ private:
   int64_t sizeOf(const BinSchedule &schedule) const {
     return unitSize(p_, stage_, schedule, kernel_.positions);
   }
-  void add(int64_t cellBegin, int64_t cellEnd, int64_t begin, int64_t end,
+  void add(int64_t bucketBegin, int64_t bucketEnd, int64_t begin, int64_t end,
            int64_t owner, bool calls = false) {
     if (begin == end && !stage_.visitsAll && !calls)
       return;
-    units_.push_back({cellBegin, cellEnd, begin, end, owner});
+    units_.push_back({bucketBegin, bucketEnd, begin, end, owner});
   }
 
   void makeCalls() {
@@ -216,7 +217,7 @@ void piko::rt::cutUnits(pikort_pipeline &p, const Stage &stage,
   if (stage.takesList())
     cutter.cutCalls();
   else
-    cutter.cutCells();
+    cutter.cutBuckets();
   cutter.mapUnits();
 }
 

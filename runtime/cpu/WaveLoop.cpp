@@ -75,14 +75,14 @@ Stream WaveLoop::takeInput() {
   return current()[running_].take(0);
 }
 
-Queue &WaveLoop::queueBehind(const Edge &edge) {
+Queue &WaveLoop::queueAfter(const Edge &edge) {
   return edge.insideLoop ? later()[memberOf(edge.consumer)]
                          : left_[static_cast<size_t>(&edge - p_.edges.data())];
 }
 
 void WaveLoop::noteCount(const Edge &edge, const Items &emitted) {
   const Stage &to = p_.stages[edge.consumer];
-  const Queue &queue = queueBehind(edge);
+  const Queue &queue = queueAfter(edge);
   leftCount_ += edge.insideLoop ? 0 : emitted.count;
   checkCount(to, queue.count + emitted.count);
   checkCount(to, queue.pairCount() + emitted.pairCount);
@@ -92,7 +92,7 @@ void WaveLoop::put(int32_t e, const Items &emitted, int64_t base,
                    const uint32_t *numbers) {
   const Edge &edge = p_.edges[e];
   noteCount(edge, emitted);
-  Queue &queue = queueBehind(edge);
+  Queue &queue = queueAfter(edge);
   queue.append(p_.memory, Stream{emitted, {}, {}, {}, {}, {}},
                recordSize(p_.stages[edge.consumer]), 0);
   uint32_t *nodes = queue.nodes.extend(p_.memory, emitted.count);
@@ -102,7 +102,7 @@ void WaveLoop::put(int32_t e, const Items &emitted, int64_t base,
 
 // --- What a serial launch emitted -------------------------------------------
 
-/// Children of a node are numbered as they were emitted, since its cells were
+/// Children of a node are numbered as they were emitted, since its buckets were
 /// taken in order.
 void WaveLoop::absorb(const Serial &launch) {
   if (launch.emitted() == 1 && launch.slots() == 1)
@@ -147,7 +147,7 @@ void WaveLoop::absorb(Kernel &kernel) {
       ports.push_back({e, takePort(p_, p_.edges[e])});
       const Stream &stream = ports.back().records.stream;
       noteCount(p_.edges[e], stream);
-      Growing<uint32_t> &nodes = queueBehind(p_.edges[e]).nodes;
+      Growing<uint32_t> &nodes = queueAfter(p_.edges[e]).nodes;
       ports.back().firstNode = nodes.size();
       nodes.extend(p_.memory, stream.count);
     }
@@ -156,19 +156,19 @@ void WaveLoop::absorb(Kernel &kernel) {
   current()[running_].nodes.reset();
   for (Port &port : ports) {
     const Edge &edge = p_.edges[port.edge];
-    queueBehind(edge).add(p_.memory, std::move(port.records.stream),
-                          recordSize(p_.stages[edge.consumer]), 0);
+    queueAfter(edge).add(p_.memory, std::move(port.records.stream),
+                         recordSize(p_.stages[edge.consumer]), 0);
   }
 }
 
-/// At the begin of each chunk of slots, and behind the last.
+/// At the begin of each chunk of slots, and after the last.
 std::vector<WaveLoop::Cursors>
 WaveLoop::findChunks(const std::vector<Port> &ports, int64_t slots) {
   Cursors all;
   for (const Port &port : ports)
     all.push_back(
         {port.records.counts.data(), port.records.ordinals.data(),
-         queueBehind(p_.edges[port.edge]).nodes.data() + port.firstNode});
+         queueAfter(p_.edges[port.edge]).nodes.data() + port.firstNode});
   auto chunks = static_cast<size_t>((slots + slotChunk - 1) / slotChunk);
   std::vector<Cursors> result(chunks + 1, all);
   parallelChunks(p_.threads, slots, slotChunk, [&](int64_t begin, int64_t end) {
@@ -250,7 +250,7 @@ static uint32_t numberSlot(std::vector<PortCursor> &ports, int64_t slot,
 }
 
 /// Numbers the nodes of what was emitted as that was. Children of a node are
-/// then numbered in their order, since its cells were taken in order.
+/// then numbered in their order, since its buckets were taken in order.
 void WaveLoop::numberRecords(const Kernel &kernel,
                              const std::vector<Port> &ports) {
   auto sumOf = [](const Cursors &cursors) {
@@ -374,7 +374,7 @@ void WaveLoop::fail() {
         uint32_t first = 0;
         if (member(m).placed())
           first = now_[m].pairs[pairStarts(p_.memory, now_[m])[i]];
-        failHops(member(m), first & ~PIKOIR_FIRST_CELL,
+        failHops(member(m), first & ~PIKOIR_FIRST_BUCKET,
                  now_[m].item(i, recordSize(member(m))));
       }
   throw Failure{PIKORT_BAD_PROGRAM, "expected a loop to hold a primitive"};

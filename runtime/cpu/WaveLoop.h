@@ -8,9 +8,9 @@
 
 namespace piko::rt {
 
-class WaveLoop : public Loop {
+class WaveLoop : public StageLoop {
 public:
-  using Loop::Loop;
+  using StageLoop::StageLoop;
   int32_t next() override;
   bool runsSerially(Kernel &kernel) const override;
   Stream takeInput() override;
@@ -53,7 +53,7 @@ private:
     return nodes.size() > 0 ? nodes[item] : item;
   }
   /// Where what comes along an edge waits.
-  Queue &queueBehind(const Edge &edge);
+  Queue &queueAfter(const Edge &edge);
   /// Puts what was emitted there; record i is node base + numbers[i].
   void put(int32_t edge, const Items &emitted, int64_t base,
            const uint32_t *numbers);

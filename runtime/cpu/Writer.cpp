@@ -18,7 +18,7 @@ using namespace piko::rt;
 
 static constexpr int64_t smallestBlock = int64_t(64) << 10;
 static constexpr int64_t largestBlock = int64_t(2) << 20;
-static constexpr int64_t noRecord = INT64_MAX; // as last_cell
+static constexpr int64_t noRecord = INT64_MAX; // as last_bucket
 
 static Lane *laneOf(pikoir_writer *writer) {
   return static_cast<Lane *>(writer);
@@ -120,15 +120,15 @@ static void noteOrdinal(Lane *lane, int32_t port) {
 uint8_t *pikoir_append(pikoir_writer *writer, int32_t port) {
   pikoir_port &out = writer->ports[port];
   if (out.flags & PIKOIR_PORT_DEFERRED) [[unlikely]]
-    return deferAppend(*laneOf(writer), port);
+    return reorderAppend(*laneOf(writer), port);
   if (out.cursor > out.limit) [[unlikely]]
     growRecords(laneOf(writer), port, 1);
   uint8_t *record = out.cursor;
   ++out.emitted;
   if (out.flags & PIKOIR_PORT_ORDINALS)
     out.ordinal = writer->ordinal++;
-  if (out.cells != 0) { // kept by its first place
-    out.last_cell = -1;
+  if (out.buckets != 0) { // kept by its first place
+    out.last_bucket = -1;
     return record;
   }
   out.cursor = record + out.size;
@@ -143,90 +143,92 @@ void pikoir_reserve(pikoir_writer *writer, int32_t port, int64_t count) {
     growRecords(laneOf(writer), port, count);
 }
 
-// --- Cells ------------------------------------------------------------------
+// --- Buckets
+// ------------------------------------------------------------------
 
-/// Makes room for one more cell; a record's cells stay together.
-static bool growCells(Lane *lane, int32_t port) {
+/// Makes room for one more bucket; a record's buckets stay together.
+static bool growBuckets(Lane *lane, int32_t port) {
   pikoir_port &out = lane->ports[port];
-  Log &log = lane->logs[port].cells;
-  auto *cursor = reinterpret_cast<uint8_t *>(out.cell_cursor);
+  Log &log = lane->logs[port].buckets;
+  auto *cursor = reinterpret_cast<uint8_t *>(out.bucket_cursor);
   uint8_t *end = nullptr;
-  int64_t keep = out.last_cell >= 0 ? (out.cell_cursor - out.run) * 4 : 0;
+  int64_t keep = out.last_bucket >= 0 ? (out.bucket_cursor - out.run) * 4 : 0;
   if (!grow(lane, log, cursor, end, keep, 4)) {
-    out.cell_cursor = out.cell_end = out.run = nullptr;
+    out.bucket_cursor = out.bucket_end = out.run = nullptr;
     return false;
   }
-  out.cell_cursor = reinterpret_cast<uint32_t *>(cursor);
-  out.cell_end = reinterpret_cast<uint32_t *>(end);
-  out.run = out.cell_cursor - keep / 4;
+  out.bucket_cursor = reinterpret_cast<uint32_t *>(cursor);
+  out.bucket_end = reinterpret_cast<uint32_t *>(end);
+  out.run = out.bucket_cursor - keep / 4;
   return true;
 }
 
-/// A cell that is not above the record's cells so far: into its place.
-static void insertCell(pikoir_port &out, uint32_t cell) {
-  *out.run &= ~PIKOIR_FIRST_CELL;
-  uint32_t *at = std::lower_bound(out.run, out.cell_cursor, cell);
-  if (*at != cell) {
+/// A bucket that is not above the record's buckets so far: into its place.
+static void insertBucket(pikoir_port &out, uint32_t bucket) {
+  *out.run &= ~PIKOIR_FIRST_BUCKET;
+  uint32_t *at = std::lower_bound(out.run, out.bucket_cursor, bucket);
+  if (*at != bucket) {
     std::memmove(at + 1, at,
-                 static_cast<size_t>(out.cell_cursor - at) * sizeof(cell));
-    *at = cell;
-    ++out.cell_cursor;
+                 static_cast<size_t>(out.bucket_cursor - at) * sizeof(bucket));
+    *at = bucket;
+    ++out.bucket_cursor;
   }
-  *out.run |= PIKOIR_FIRST_CELL;
+  *out.run |= PIKOIR_FIRST_BUCKET;
 }
 
-[[gnu::noinline]] static void badPlace(Lane *lane, int32_t port, int64_t cell) {
+[[gnu::noinline]] static void badPlace(Lane *lane, int32_t port,
+                                       int64_t bucket) {
   pikoir_port &out = lane->ports[port];
-  if (out.last_cell == noRecord)
+  if (out.last_bucket == noRecord)
     return badCall(*lane, BadCall::PlaceFirst);
   const Stage &to = lane->pipeline->stages[lane->logs[port].consumer];
-  int64_t bin = cell / to.tiles - (cell % to.tiles < 0);
+  int64_t bin = bucket / to.tiles - (bucket % to.tiles < 0);
   lane->pipeline->report(
       {lane->unit,
        bin == PIKOIR_NAN_BOX ? PIKORT_NOT_A_NUMBER : PIKORT_BIN_OUTSIDE,
-       lane->logs[port].consumer, bin, to.cells / to.tiles, depthOf(*lane)});
+       lane->logs[port].consumer, bin, to.buckets / to.tiles, depthOf(*lane)});
 }
 
-void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell) {
+void pikoir_place(pikoir_writer *writer, int32_t port, int64_t bucket) {
   pikoir_port &out = writer->ports[port];
   if (out.flags & PIKOIR_PORT_DEFERRED) [[unlikely]]
-    return deferPlace(*laneOf(writer), port, cell);
-  if (static_cast<uint64_t>(cell) >= static_cast<uint64_t>(out.cells) ||
-      out.last_cell == noRecord) [[unlikely]]
-    return badPlace(laneOf(writer), port, cell);
-  if (cell == out.last_cell)
+    return reorderPlace(*laneOf(writer), port, bucket);
+  if (static_cast<uint64_t>(bucket) >= static_cast<uint64_t>(out.buckets) ||
+      out.last_bucket == noRecord) [[unlikely]]
+    return badPlace(laneOf(writer), port, bucket);
+  if (bucket == out.last_bucket)
     return;
-  if (out.flags & PIKOIR_PORT_LOCAL) { // the only cell is known
-    if (out.last_cell < 0)
+  if (out.flags & PIKOIR_PORT_LOCAL) { // the only bucket is known
+    if (out.last_bucket < 0)
       out.cursor += out.size;
-    out.last_cell = cell;
+    out.last_bucket = bucket;
     return;
   }
-  if (out.cell_cursor == out.cell_end) [[unlikely]]
-    if (!growCells(laneOf(writer), port)) {
-      if (out.last_cell < 0 && out.cursor <= out.limit)
+  if (out.bucket_cursor == out.bucket_end) [[unlikely]]
+    if (!growBuckets(laneOf(writer), port)) {
+      if (out.last_bucket < 0 && out.cursor <= out.limit)
         out.cursor += out.size;
-      out.last_cell = cell;
+      out.last_bucket = bucket;
       return;
     }
-  auto entry = static_cast<uint32_t>(cell);
-  if (out.last_cell < 0) {
-    entry |= PIKOIR_FIRST_CELL;
+  auto entry = static_cast<uint32_t>(bucket);
+  if (out.last_bucket < 0) {
+    entry |= PIKOIR_FIRST_BUCKET;
     out.cursor += out.size;
-    out.run = out.cell_cursor;
+    out.run = out.bucket_cursor;
     ++out.kept;
     if (out.flags & PIKOIR_PORT_ORDINALS)
       noteOrdinal(laneOf(writer), port);
-  } else if (cell < out.last_cell) [[unlikely]] {
-    insertCell(out, entry);
-    return; // last_cell stays the highest
+  } else if (bucket < out.last_bucket) [[unlikely]] {
+    insertBucket(out, entry);
+    return; // last_bucket stays the highest
   }
-  *out.cell_cursor++ = entry;
-  out.last_cell = cell;
+  *out.bucket_cursor++ = entry;
+  out.last_bucket = bucket;
 }
 
-void pikoir_place_source(pikoir_writer *writer, int64_t cell) {
-  pikoir_place(writer, 0, cell);
+void pikoir_place_source(pikoir_writer *writer, int64_t bucket) {
+  pikoir_place(writer, 0, bucket);
 }
 
 // --- Positions and units ----------------------------------------------------
@@ -235,8 +237,8 @@ void pikoir_next(pikoir_writer *writer) {
   if (writer->flags == 0)
     return;
   if (writer->flags & PIKOIR_PORT_DEFERRED) [[unlikely]] {
-    badCall(*laneOf(writer), BadCall::StillDeferring);
-    pikoir_defer_end(writer);
+    badCall(*laneOf(writer), BadCall::StillReordering);
+    pikoir_reorder_end(writer);
   }
   if (writer->flags & PIKOIR_PORT_SERIAL) {
     Lane &lane = *laneOf(writer);
@@ -249,17 +251,17 @@ void pikoir_next(pikoir_writer *writer) {
   for (int32_t i = 0; i < writer->port_count; ++i) {
     pikoir_port &out = writer->ports[i];
     if (out.flags & PIKOIR_PORT_COUNTS) {
-      int64_t now = out.cells ? out.kept : out.emitted;
+      int64_t now = out.buckets ? out.kept : out.emitted;
       if (out.counts == laneOf(writer)->logs[i].countsEnd) [[unlikely]]
         return badCall(*laneOf(writer), BadCall::Next);
       *out.counts++ = static_cast<uint32_t>(now - out.mark);
       out.mark = now;
     }
     if (out.flags & PIKOIR_PORT_SOURCE) {
-      if (out.last_cell < 0 &&
-          (out.cell_cursor != out.cell_end || growCells(laneOf(writer), i)))
-        *out.cell_cursor++ = noCell;
-      out.last_cell = -1;
+      if (out.last_bucket < 0 && (out.bucket_cursor != out.bucket_end ||
+                                  growBuckets(laneOf(writer), i)))
+        *out.bucket_cursor++ = noBucket;
+      out.last_bucket = -1;
     }
   }
 }
@@ -294,7 +296,7 @@ static pikoir_writer *openUnit(Kernel &kernel, int64_t unit) {
   for (int32_t i = 0; i < lane->port_count; ++i) {
     pikoir_port &out = lane->ports[i];
     out.emitted = out.kept = out.mark = 0;
-    out.last_cell = out.flags & PIKOIR_PORT_SOURCE ? -1 : noRecord;
+    out.last_bucket = out.flags & PIKOIR_PORT_SOURCE ? -1 : noRecord;
     if (out.flags & PIKOIR_PORT_COUNTS) {
       uint32_t *counts = kernel.counts[i].data();
       out.counts = counts + kernel.slotBegin(unit);
@@ -325,15 +327,15 @@ pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
            p.ticksPerMillisecond;
   };
   pikort_unit_run run{p.kernelStats[kernel.statsIndex].name.c_str(),
-                      unit.cell_begin,
-                      unit.cell_end,
+                      unit.bucket_begin,
+                      unit.bucket_end,
                       unit.end - unit.begin,
                       static_cast<int32_t>(pikoir_thread()),
                       time(lane.opened),
                       time(closed)};
   if (kernel.calls) {
-    run.bin_begin = kernel.calls[unit.cell_begin].bin;
-    run.bin_end = kernel.calls[unit.cell_end - 1].bin + 1;
+    run.bin_begin = kernel.calls[unit.bucket_begin].bin;
+    run.bin_end = kernel.calls[unit.bucket_end - 1].bin + 1;
   } else if (kernel.source < 0) {
     run.bin_begin /= stage.tiles;
     run.bin_end = (run.bin_end + stage.tiles - 1) / stage.tiles;
@@ -344,8 +346,8 @@ pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
 void pikoir_close(pikoir_writer *writer) {
   Lane *lane = laneOf(writer);
   if (lane->flags & PIKOIR_PORT_DEFERRED) [[unlikely]] {
-    badCall(*lane, BadCall::StillDeferring);
-    pikoir_defer_end(writer);
+    badCall(*lane, BadCall::StillReordering);
+    pikoir_reorder_end(writer);
   }
   pikoir_scratch_release(writer, 0);
   if (lane->flags & PIKOIR_PORT_SERIAL) {
@@ -363,8 +365,8 @@ void pikoir_close(pikoir_writer *writer) {
       if (out.flags & PIKOIR_PORT_COUNTS)
         std::fill(out.counts, logs.countsEnd, 0u);
       endSegment(lane, logs.records, out.cursor);
-      endSegment(lane, logs.cells,
-                 reinterpret_cast<uint8_t *>(out.cell_cursor));
+      endSegment(lane, logs.buckets,
+                 reinterpret_cast<uint8_t *>(out.bucket_cursor));
       endSegment(lane, logs.ordinals,
                  reinterpret_cast<uint8_t *>(out.ordinal_cursor));
     }
@@ -437,7 +439,7 @@ static void preparePort(pikort_pipeline &p, const Kernel &kernel, Lane &lane,
   const Record &record = p.records[to.record];
   if (kernel.source < 0)
     out.size = record.size;
-  out.cells = to.placed() ? to.cells : 0;
+  out.buckets = to.placed() ? to.buckets : 0;
   logs.padded = record.padded;
   logs.scratch.resize(
       static_cast<size_t>(PIKOIR_MOST_RESERVED * record.size + record.align));

@@ -15,7 +15,7 @@
 using namespace piko::cuda;
 using piko::rt::Failure, piko::rt::quoted;
 
-/// A barrier of blocks takes as long as some 20 loads, one behind the other,
+/// A barrier of blocks takes as long as some 20 loads, one after the other,
 /// and a join has a dozen of them; 2,000 things are eight for a thread of one
 /// block.
 static int64_t findMostAlone() {
@@ -390,7 +390,7 @@ void pikoir_cuda_program(pikort_pipeline *p, const pikoir_cuda_step *steps,
     if (!executor || count < 0)
       throw Failure{PIKORT_BAD_PROGRAM,
                     "pipeline " + quoted(p->name) +
-                        ": expected pikoir_cuda_module in front of "
+                        ": expected pikoir_cuda_module before "
                         "pikoir_cuda_program, and at least 0 steps"};
     executor->setProgram({steps, static_cast<size_t>(count)});
   });

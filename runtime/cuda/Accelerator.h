@@ -92,7 +92,7 @@ private:
   void launch(const GridLaunch &grid, CUstream stream);
   /// Of a frame: what the device has there when its stream has ended; throws.
   int32_t read(const int32_t *data);
-  /// Behind what the stream has been given.
+  /// After what the stream has been given.
   void noteEnd();
   uint8_t *allocated(CUresult result, CUdeviceptr address, size_t bytes);
   /// For all that is in the stream; throws.
@@ -109,7 +109,7 @@ private:
   std::unordered_map<std::string, CUfunction> ownFunctions_;
   CUstream own_ = nullptr;
   CUstream stream_ = nullptr; ///< Of the run; the host's, or our own.
-  CUevent done_ = nullptr;    ///< Behind a frame that is not waited for.
+  CUevent done_ = nullptr;    ///< After a frame that is not waited for.
   bool usesEvent_ = false;    ///< To wait for the run.
   bool isBusy_ = false;       ///< The stream may have something to do for it.
   Submission submission_{*this, *device_};

@@ -112,25 +112,25 @@ int32_t CudaExecutor::runProgram() {
   });
   return isPending_ || p.status != PIKORT_OK
              ? p.status.load()
-             : repeatProgram(Frame::Outcome::Repeat);
+             : repeatProgram(DeviceFrame::Outcome::Repeat);
 }
 
 int32_t CudaExecutor::awaitProgram() {
   isPending_ = false;
   p.profile.enter(Part::Device);
-  Frame::Outcome outcome = frame_.await();
+  DeviceFrame::Outcome outcome = frame_.await();
   p.profile.enter(Part::Program);
-  if (outcome == Frame::Outcome::Done)
+  if (outcome == DeviceFrame::Outcome::Done)
     return p.status;
   isRepeated_ = true;
   return repeatProgram(outcome);
 }
 
-int32_t CudaExecutor::repeatProgram(Frame::Outcome outcome) {
+int32_t CudaExecutor::repeatProgram(DeviceFrame::Outcome outcome) {
   restartRun();
   int32_t status = CPUExecutor::runProgram();
   if (status == PIKORT_OK && p.settle() == PIKORT_OK &&
-      outcome == Frame::Outcome::Spoilt)
+      outcome == DeviceFrame::Outcome::Spoilt)
     throw Failure{PIKORT_OUT_OF_MEMORY,
                   "pipeline " + quoted(p.name) +
                       ": out of memory on the device, and what the run changes "

@@ -2,9 +2,9 @@
 //===- CudaExecutor.h - Runs a pipeline on a CUDA device ------------------===//
 //
 // A device takes a run as a whole where the program says what to do as a table
-// of steps, and nothing needs the host meanwhile (Frame). Else, or where that
-// ends early, the run goes through the program on the host, which joins what
-// kernels emit, as for a CPU; the device runs the kernels.
+// of steps, and nothing needs the host meanwhile (DeviceFrame). Else, or where
+// that ends early, the run goes through the program on the host, which joins
+// what kernels emit, as for a CPU; the device runs the kernels.
 //
 //===----------------------------------------------------------------------===//
 
@@ -39,14 +39,14 @@ private:
   }
   void record();
   /// Runs the program step by step, for a frame that could not.
-  int32_t repeatProgram(Frame::Outcome outcome);
+  int32_t repeatProgram(DeviceFrame::Outcome outcome);
   /// Begins the run anew, on what it began with.
   void restartRun();
 
-  Frame frame_;
+  DeviceFrame frame_;
   Steps program_;
   bool isPending_ = false;  ///< The run has been submitted.
-  bool isRepeated_ = false; ///< It had to be, behind it.
+  bool isRepeated_ = false; ///< It had to be, after it.
 };
 
 } // namespace piko::cuda

@@ -38,7 +38,7 @@ public:
         takeBytes(static_cast<size_t>(count) * sizeof(T)));
     return std::launder(taken);
   }
-  /// One that is zero, and behind it copies of elements.
+  /// One that is zero, and after it copies of elements.
   template <class T, class... Elements>
   T &takeWith(const std::vector<Elements> &...elements) {
     size_t bytes =

@@ -10,12 +10,12 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
-/// In front of what grids take of the log: see gpu/Log.cpp.
+/// Before what grids take of the log: see gpu/Log.cpp.
 static constexpr int64_t headRoom = 64, spareRoom = int64_t(1) << 26;
 
 // --- What runs without the host ---------------------------------------------
 
-bool Frame::isPossible() const {
+bool DeviceFrame::isPossible() const {
   if (needsHost_ || !device_.canWaitInGrids() ||
       p_.executor->reportsInOrder() || p_.unitReport || p_.memory.limit() > 0 ||
       p_.memory.budget() > 0)
@@ -25,10 +25,10 @@ bool Frame::isPossible() const {
       [&](const Stage &stage) { return isStacked(stage) && stage.hosts; });
 }
 
-Frame::Frame(pikort_pipeline &p, Accelerator &device)
+DeviceFrame::DeviceFrame(pikort_pipeline &p, Accelerator &device)
     : p_(p), device_(device), exchange_(device) {}
 
-void Frame::reset() {
+void DeviceFrame::reset() {
   takeMemory();
   for (LoopState &loop : std::span(loops_, p_.loops.size()))
     loop.again = 1;
@@ -44,13 +44,14 @@ void Frame::reset() {
 }
 
 /// What the device says comes first.
-void Frame::takeMemory() {
+void DeviceFrame::takeMemory() {
   auto countOf = [](const auto &list) {
     return static_cast<int64_t>(list.size());
   };
   blockSums_.resize(device_, sizeof(BlockSums));
   exchange_.reset();
-  places_ = exchange_.take<Place>(countOf(p_.stages) + countOf(p_.sources));
+  places_ =
+      exchange_.take<KernelPlace>(countOf(p_.stages) + countOf(p_.sources));
   received_ = exchange_.take<uint64_t>(countOf(p_.edges) + countOf(p_.sources));
   frame_ = exchange_.take<FrameState>();
   queues_ = exchange_.take<QueueState>(countOf(p_.edges) + countOf(p_.stages));
@@ -59,14 +60,14 @@ void Frame::takeMemory() {
   stackStates_ = exchange_.take<StackState>(countOf(p_.loops));
 }
 
-size_t Frame::placeOf(int32_t number, bool isSource) const {
+size_t DeviceFrame::placeOf(int32_t number, bool isSource) const {
   auto at = static_cast<size_t>(number);
   return isSource ? p_.stages.size() + at : at;
 }
 
 // --- What joins are told ----------------------------------------------------
 
-JoinArgs &Frame::describeSource(int32_t source) {
+JoinArgs &DeviceFrame::describeSource(int32_t source) {
   const Stage &stage = p_.stages[p_.sources[source].stage];
   std::vector<JoinInput> inputs{describeSourceInput(stage, source)};
   inputs[0].producer = nullptr;
@@ -79,7 +80,8 @@ JoinArgs &Frame::describeSource(int32_t source) {
   return args;
 }
 
-JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
+JoinInput DeviceFrame::describeSourceInput(const Stage &stage,
+                                           int32_t source) const {
   const Source &from = p_.sources[source];
   JoinInput input{};
   input.items = from.data;
@@ -95,7 +97,7 @@ JoinInput Frame::describeSourceInput(const Stage &stage, int32_t source) const {
   return input;
 }
 
-JoinInput Frame::describeEdge(int32_t number) const {
+JoinInput DeviceFrame::describeEdge(int32_t number) const {
   const Edge &edge = p_.edges[number];
   const Stage &from = p_.stages[edge.producer];
   bool isHosted = from.host >= 0;
@@ -112,7 +114,7 @@ JoinInput Frame::describeEdge(int32_t number) const {
   return input;
 }
 
-std::vector<JoinInput> Frame::describeInputs(const Stage &stage) const {
+std::vector<JoinInput> DeviceFrame::describeInputs(const Stage &stage) const {
   std::vector<JoinInput> inputs;
   for (int32_t source : stage.sources)
     inputs.push_back(describeSourceInput(stage, source));
@@ -130,14 +132,15 @@ std::vector<JoinInput> Frame::describeInputs(const Stage &stage) const {
   return inputs;
 }
 
-Shape Frame::describeShape(const Stage &stage) const {
+Shape DeviceFrame::describeShape(const Stage &stage) const {
   int32_t keyWidth = stage.keyWidth;
   if (stage.loop >= 0)
     keyWidth = std::max(keyWidth, p_.loops[stage.loop].keyWidth);
-  return {p_.records[stage.record].size, stage.cells, stage.placed(), keyWidth};
+  return {p_.records[stage.record].size, stage.buckets, stage.placed(),
+          keyWidth};
 }
 
-std::vector<JoinClear> Frame::describeClears(const Stage &stage) {
+std::vector<JoinClear> DeviceFrame::describeClears(const Stage &stage) {
   std::vector<JoinClear> clears;
   for (int32_t id : stage.clears) {
     const State &state = p_.states[id];
@@ -147,7 +150,7 @@ std::vector<JoinClear> Frame::describeClears(const Stage &stage) {
   return clears;
 }
 
-const uint8_t *Frame::clearRecord(const State &state) {
+const uint8_t *DeviceFrame::clearRecord(const State &state) {
   const uint8_t *&record = clearRecords_[&state];
   if (record)
     return record;
@@ -158,7 +161,7 @@ const uint8_t *Frame::clearRecord(const State &state) {
   return record = onDevice(taken);
 }
 
-JoinArgs &Frame::describeStage(int32_t number) {
+JoinArgs &DeviceFrame::describeStage(int32_t number) {
   const Stage &stage = p_.stages[number];
   std::vector<JoinInput> inputs =
       loop_.entries.empty() ? describeInputs(stage) : describeWave(number);
@@ -195,7 +198,7 @@ static BinCut describeBin(const Stage &stage, const BinSchedule &schedule) {
 
 /// The same for all strips and waves. A bin that is to be the first core's is a
 /// unit, as no result depends on who runs it.
-const BinCut *Frame::describeBins(const Stage &stage) {
+const BinCut *DeviceFrame::describeBins(const Stage &stage) {
   const BinCut *&cuts = cuts_[&stage];
   if (cuts)
     return cuts;
@@ -209,7 +212,7 @@ const BinCut *Frame::describeBins(const Stage &stage) {
   return cuts = exchange_.copy(all);
 }
 
-void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
+void DeviceFrame::describeSchedule(JoinArgs &args, const Stage &stage) {
   args.takesList = stage.takesList();
   args.collects = stage.collects();
   args.visitsAll = stage.visitsAll;
@@ -219,7 +222,7 @@ void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
   args.everyBin = cut.everyBin;
   args.tileSplit = cut.tileSplit;
   args.batch = cut.batch;
-  args.cutting = stage.schedule.kind == PIKOIR_SERIALIZE ? CutNone : CutCells;
+  args.cutting = stage.schedule.kind == PIKOIR_SERIALIZE ? CutNone : CutBuckets;
   if (!stage.binSchedules)
     return;
   args.cutting = CutBins;
@@ -233,7 +236,8 @@ void Frame::describeSchedule(JoinArgs &args, const Stage &stage) {
 
 // --- What a program does ----------------------------------------------------
 
-void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
+void DeviceFrame::launchOwn(const char *kernel, const void *args,
+                            int32_t timed) {
   steps_.push_back({Step::Kind::Grid,
                     {kernel,
                      device_.joinBlocks(kernel),
@@ -244,7 +248,7 @@ void Frame::launchOwn(const char *kernel, const void *args, int32_t timed) {
                     timed});
 }
 
-void Frame::launchWarp(const char *kernel, const void *args) {
+void DeviceFrame::launchWarp(const char *kernel, const void *args) {
   steps_.push_back({Step::Kind::Grid,
                     {kernel,
                      /*blocks=*/1,
@@ -253,7 +257,7 @@ void Frame::launchWarp(const char *kernel, const void *args) {
                      /*isJoin=*/false}});
 }
 
-int32_t Frame::kernelOf(int32_t number, bool isSource) const {
+int32_t DeviceFrame::kernelOf(int32_t number, bool isSource) const {
   int32_t kernel = 0;
   for (size_t s = 0; s < p_.stages.size(); ++s) {
     for (int32_t source : p_.stages[s].sources)
@@ -269,14 +273,14 @@ int32_t Frame::kernelOf(int32_t number, bool isSource) const {
   return -1;
 }
 
-void Frame::record(Steps program, std::span<const int64_t> stripSizes) {
+void DeviceFrame::record(Steps program, std::span<const int64_t> stripSizes) {
   reset();
   program_ = program;
   for (size_t at = 0; at < program.size() && p_.status == PIKORT_OK; ++at)
     recordStep(at, stripSizes);
 }
 
-void Frame::recordStep(size_t at, std::span<const int64_t> stripSizes) {
+void DeviceFrame::recordStep(size_t at, std::span<const int64_t> stripSizes) {
   const pikoir_cuda_step &step = program_[at];
   int32_t number = step.number;
   switch (step.kind) {
@@ -284,7 +288,7 @@ void Frame::recordStep(size_t at, std::span<const int64_t> stripSizes) {
     return clear(number);
   case PIKOIR_STEP_SOURCE:
   case PIKOIR_STEP_STAGE:
-    return recordKernel(step, queuesBehind(at));
+    return recordKernel(step, queuesAfter(at));
   case PIKOIR_STEP_HOST:
     step.host(&p_); // which notes its errors
     return;
@@ -308,24 +312,24 @@ void Frame::recordStep(size_t at, std::span<const int64_t> stripSizes) {
   }
 }
 
-Steps Frame::queuesBehind(size_t at) const {
+Steps DeviceFrame::queuesAfter(size_t at) const {
   size_t end = ++at;
   while (end < program_.size() && program_[end].kind == PIKOIR_STEP_QUEUE)
     ++end;
   return program_.subspan(at, end - at);
 }
 
-void Frame::recordKernel(const pikoir_cuda_step &step, Steps queues) {
+void DeviceFrame::recordKernel(const pikoir_cuda_step &step, Steps queues) {
   bool isSource = step.kind == PIKOIR_STEP_SOURCE;
-  Place &place = join(step.number, isSource);
+  KernelPlace &place = join(step.number, isSource);
   for (const pikoir_cuda_grid *grid = step.grids; grid->kernel; ++grid)
     launch(*grid, place, step.number);
   if (!isSource && !isStacked(p_.stages[step.number]))
     queue(place, queues);
 }
 
-Frame::Place &Frame::join(int32_t number, bool isSource) {
-  Place &place = find(number, isSource);
+DeviceFrame::KernelPlace &DeviceFrame::join(int32_t number, bool isSource) {
+  KernelPlace &place = find(number, isSource);
   place.stage = isSource ? -1 : number;
   timed_ = kernelOf(number, isSource);
   const Stage &stage = p_.stages[isSource ? p_.sources[number].stage : number];
@@ -346,7 +350,7 @@ Frame::Place &Frame::join(int32_t number, bool isSource) {
   return place;
 }
 
-void Frame::showConstants(GridLaunch &grid) const {
+void DeviceFrame::showConstants(GridLaunch &grid) const {
   for (const State &state : p_.states)
     if (state.kind == PIKORT_CONSTANT && state.hosts)
       std::replace(grid.arguments.begin(), grid.arguments.end(),
@@ -354,7 +358,8 @@ void Frame::showConstants(GridLaunch &grid) const {
                    reinterpret_cast<int64_t>(state.twin.data()));
 }
 
-void Frame::launch(const pikoir_cuda_grid &grid, Place &place, int32_t number) {
+void DeviceFrame::launch(const pikoir_cuda_grid &grid, KernelPlace &place,
+                         int32_t number) {
   std::vector<int64_t> words(static_cast<size_t>(grid.count));
   grid.arguments(&p_, onDevice(&place.state.input), onDevice(&place.state.log),
                  words.data());
@@ -366,7 +371,7 @@ void Frame::launch(const pikoir_cuda_grid &grid, Place &place, int32_t number) {
   steps_.push_back({Step::Kind::Grid, std::move(launch), nullptr, timed_});
 }
 
-int64_t Frame::mostItems(const JoinArgs &args) const {
+int64_t DeviceFrame::mostItems(const JoinArgs &args) const {
   int64_t most = 0;
   for (const JoinInput &input :
        std::span(args.inputs(), static_cast<size_t>(args.inputCount))) {
@@ -377,7 +382,8 @@ int64_t Frame::mostItems(const JoinArgs &args) const {
   return most;
 }
 
-int64_t Frame::blocks(int32_t number, bool isSource, int64_t threads) const {
+int64_t DeviceFrame::blocks(int32_t number, bool isSource,
+                            int64_t threads) const {
   if (!isSource && isStacked(p_.stages[number]))
     return 1;
   const JoinArgs &args = *find(number, isSource).args;
@@ -388,7 +394,7 @@ int64_t Frame::blocks(int32_t number, bool isSource, int64_t threads) const {
   return std::max<int64_t>(blocks, 1);
 }
 
-void Frame::clear(int32_t id) {
+void DeviceFrame::clear(int32_t id) {
   const State &state = p_.states[id];
   int64_t size = p_.records[state.record].size;
   isCleared_[static_cast<size_t>(id)] = true;
@@ -404,7 +410,7 @@ void Frame::clear(int32_t id) {
 
 // --- The submission ---------------------------------------------------------
 
-bool Frame::submit() {
+bool DeviceFrame::submit() {
   std::span<uint8_t> room;
   if (!needsHost_)
     room = device_.logSpace();
@@ -427,9 +433,9 @@ bool Frame::submit() {
   return true;
 }
 
-bool Frame::isDone() const { return device_.isDone(); }
+bool DeviceFrame::isDone() const { return device_.isDone(); }
 
-Frame::Outcome Frame::await() {
+DeviceFrame::Outcome DeviceFrame::await() {
   device_.await(steps_);
   const KernelState *last = exchange_.onHost(frame_->latest);
   int64_t end =
@@ -446,7 +452,7 @@ Frame::Outcome Frame::await() {
   return Outcome::Done;
 }
 
-bool Frame::keepsState() const {
+bool DeviceFrame::keepsState() const {
   for (size_t i = 0; i < p_.states.size(); ++i) {
     const State &state = p_.states[i];
     bool changes = state.kind == PIKORT_IMAGE || state.written;
@@ -457,9 +463,9 @@ bool Frame::keepsState() const {
   return false;
 }
 
-void Frame::noteStatistics() {
+void DeviceFrame::noteStatistics() {
   for (size_t s = 0; s < p_.stages.size(); ++s) {
-    const Place &place = find(static_cast<int32_t>(s), false);
+    const KernelPlace &place = find(static_cast<int32_t>(s), false);
     p_.stageStats[s].in += place.state.in;
     p_.stageStats[s].placed += place.state.placed;
   }

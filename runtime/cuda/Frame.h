@@ -2,7 +2,7 @@
 //===- Frame.h - A pipeline's frame as one submission ---------------------===//
 //
 // What a program does is a table of steps (pikort/grid.h), of which a frame
-// makes what is submitted. In front of each kernel goes a join
+// makes what is submitted. Before each kernel goes a join
 // (device/Joins.h), which finds its input and its units. Grids have as many
 // blocks as fill the device, and go over the units that they find. Memory is
 // taken from the pipeline's log space, in address order, from the first kernel
@@ -55,12 +55,12 @@ struct Step {
   bool operator==(const Step &) const = default;
 };
 
-/// Steps of a program, one behind the other.
+/// Steps of a program, one after the other.
 using Steps = std::span<const pikoir_cuda_step>;
 
-class Frame {
+class DeviceFrame {
 public:
-  Frame(pikort_pipeline &p, Accelerator &device);
+  DeviceFrame(pikort_pipeline &p, Accelerator &device);
 
   /// Whether the device can run all of it, as far as is known: the pipeline, or
   /// this run of it, may need the host between its kernels.
@@ -84,7 +84,7 @@ public:
 
 private:
   /// A kernel of the program: a stage's, or the AssignBin of a source.
-  struct Place {
+  struct KernelPlace {
     KernelState state;
     JoinArgs *args; ///< Of its latest join, where the host has them.
     int32_t stage;  ///< -1: of a source.
@@ -106,7 +106,7 @@ private:
   };
 
   /// The queues of what the kernel at a place of the program emits.
-  Steps queuesBehind(size_t at) const;
+  Steps queuesAfter(size_t at) const;
   LoopSteps loopAt(size_t at) const;
   void recordStep(size_t at, std::span<const int64_t> stripSizes);
   void recordKernel(const pikoir_cuda_step &step, Steps queues);
@@ -132,13 +132,13 @@ private:
   /// What kernels see of the program's pointers.
   void showConstants(GridLaunch &grid) const;
   /// Finds the input and the units of a kernel.
-  Place &join(int32_t number, bool isSource);
-  void launch(const pikoir_cuda_grid &grid, Place &place, int32_t number);
+  KernelPlace &join(int32_t number, bool isSource);
+  void launch(const pikoir_cuda_grid &grid, KernelPlace &place, int32_t number);
   int64_t blocks(int32_t number, bool isSource, int64_t threads) const;
   /// Sets an image, or a buffer that is sized by a source, to its clear value.
   void clear(int32_t state);
   size_t placeOf(int32_t number, bool isSource) const;
-  Place &find(int32_t number, bool isSource) const {
+  KernelPlace &find(int32_t number, bool isSource) const {
     return places_[placeOf(number, isSource)];
   }
   /// Notes a grid of the runtime's own kernels, for one of the pipeline's.
@@ -162,7 +162,7 @@ private:
   /// Where the device has the record that an image is cleared to.
   const uint8_t *clearRecord(const rt::State &state);
   // What kernels of a cycle emit waits in queues (FrameCycles.cpp).
-  void queue(const Place &place, Steps queues);
+  void queue(const KernelPlace &place, Steps queues);
   void repeat(const int32_t &again);
   void endRepeat(const int32_t &again);
   QueueState &entriesOf(int32_t stage) const {
@@ -217,7 +217,7 @@ private:
   std::vector<StripRecord> strips_; ///< Of each group.
   // What host and device have of a frame:
   Exchange exchange_;
-  Place *places_ = nullptr;
+  KernelPlace *places_ = nullptr;
   uint64_t *received_ = nullptr; ///< Of each edge, then of each source.
   FrameState *frame_ = nullptr;  ///< To here the device says something.
   /// Of each edge, then, of what comes into a loop, of each stage.

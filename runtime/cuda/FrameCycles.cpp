@@ -5,12 +5,12 @@
 //
 //   repeat { for each stage: join, kernel, piko_queue; piko_wave } piko_leave
 //
-// behind piko_enter, if primitives come into it at several stages; or, if the
+// after piko_enter, if primitives come into it at several stages; or, if the
 // order of its hops can be seen, which runs one position at a time,
 //
 //   piko_enter repeat { for each stage: kernel; piko_step } piko_leave
 //
-// and a cycle whose stages a, b collect, with what does not behind each:
+// and a cycle whose stages a, b collect, with what does not after each:
 //
 //   loops and stages  repeat { a  loops and stages  b  loops and stages
 //                              piko_round }
@@ -26,7 +26,7 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
-Frame::LoopSteps Frame::loopAt(size_t at) const {
+DeviceFrame::LoopSteps DeviceFrame::loopAt(size_t at) const {
   LoopSteps loop;
   for (loop.number = program_[at].number;
        program_[at].kind != PIKOIR_STEP_END_WAVES; ++at) {
@@ -36,19 +36,19 @@ Frame::LoopSteps Frame::loopAt(size_t at) const {
     else if (step.kind == PIKOIR_STEP_EXIT)
       loop.exits.push_back(&step);
     else if (step.kind == PIKOIR_STEP_STAGE)
-      loop.members.push_back({step.number, queuesBehind(at)});
+      loop.members.push_back({step.number, queuesAfter(at)});
   }
   return loop;
 }
 
-const pikoir_cuda_step *Frame::entryOf(int32_t stage) const {
+const pikoir_cuda_step *DeviceFrame::entryOf(int32_t stage) const {
   auto found = std::find_if(
       loop_.entries.begin(), loop_.entries.end(),
       [&](const pikoir_cuda_step *entry) { return entry->number == stage; });
   return found == loop_.entries.end() ? nullptr : *found;
 }
 
-std::vector<QueuePort> Frame::describePorts(Steps queues) const {
+std::vector<QueuePort> DeviceFrame::describePorts(Steps queues) const {
   std::vector<QueuePort> ports;
   for (const pikoir_cuda_step &step : queues) {
     const Edge &edge = p_.edges[step.number];
@@ -60,7 +60,7 @@ std::vector<QueuePort> Frame::describePorts(Steps queues) const {
   return ports;
 }
 
-void Frame::queue(const Place &place, Steps queues) {
+void DeviceFrame::queue(const KernelPlace &place, Steps queues) {
   std::vector<QueuePort> ports = describePorts(queues);
   if (ports.empty())
     return;
@@ -75,21 +75,21 @@ void Frame::queue(const Place &place, Steps queues) {
 
 // --- Loops ------------------------------------------------------------------
 
-void Frame::repeat(const int32_t &again) {
+void DeviceFrame::repeat(const int32_t &again) {
   steps_.push_back({Step::Kind::Repeat, {}, onDevice(&again)});
 }
 
-void Frame::endRepeat(const int32_t &again) {
+void DeviceFrame::endRepeat(const int32_t &again) {
   steps_.push_back({Step::Kind::End, {}, onDevice(&again)});
 }
 
-void Frame::beginLoop() {
+void DeviceFrame::beginLoop() {
   if (!loop_.entries.empty())
     enter();
   repeat(loops_[loop_.number].again);
 }
 
-void Frame::endLoop() {
+void DeviceFrame::endLoop() {
   if (stack_)
     endPosition();
   else
@@ -99,7 +99,7 @@ void Frame::endLoop() {
   stack_ = nullptr;
 }
 
-StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
+StepArgs &DeviceFrame::takeStep(const std::vector<QueueState *> &waiting) {
   auto &args = exchange_.takeWith<StepArgs>(waiting);
   args.queueCount = static_cast<int32_t>(waiting.size());
   args.frame = onDevice(frame_);
@@ -109,7 +109,7 @@ StepArgs &Frame::takeStep(const std::vector<QueueState *> &waiting) {
 }
 
 /// What a stage takes of such a loop.
-std::vector<JoinInput> Frame::describeWave(int32_t number) const {
+std::vector<JoinInput> DeviceFrame::describeWave(int32_t number) const {
   const Stage &stage = p_.stages[number];
   std::vector<JoinInput> inputs = describeInputs(stage);
   std::erase_if(inputs, [](const JoinInput &input) { return !input.isInLoop; });
@@ -121,7 +121,7 @@ std::vector<JoinInput> Frame::describeWave(int32_t number) const {
   return inputs;
 }
 
-void Frame::enter() {
+void DeviceFrame::enter() {
   std::vector<LoopEntry> entries;
   std::vector<JoinInput> inputs;
   for (const pikoir_cuda_step *entry : loop_.entries) {
@@ -148,7 +148,7 @@ void Frame::enter() {
   launchOwn("piko_enter", &args);
 }
 
-StackArgs &Frame::describeStack() {
+StackArgs &DeviceFrame::describeStack() {
   std::vector<StackMember> members;
   std::vector<QueuePort> ports;
   for (const LoopSteps::Member &member : loop_.members) {
@@ -170,12 +170,12 @@ StackArgs &Frame::describeStack() {
   return args;
 }
 
-void Frame::endPosition() {
+void DeviceFrame::endPosition() {
   stack_->number = nextNumber();
   launchWarp(stepKernel, stack_);
 }
 
-void Frame::endWave() {
+void DeviceFrame::endWave() {
   StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     return edge.insideLoop && p_.stages[edge.producer].loop == loop_.number;
   }));
@@ -185,7 +185,7 @@ void Frame::endWave() {
   launchOwn("piko_wave", &args);
 }
 
-void Frame::leave() {
+void DeviceFrame::leave() {
   std::vector<ExitGroup> groups;
   for (const pikoir_cuda_step *exit : loop_.exits) {
     const Edge &edge = p_.edges[exit->number];
@@ -203,7 +203,7 @@ void Frame::leave() {
 
 // --- Rounds -----------------------------------------------------------------
 
-void Frame::endRounds(int32_t cycle) {
+void DeviceFrame::endRounds(int32_t cycle) {
   StepArgs &args = takeStep(describeWaiting([&](const Edge &edge) {
     const Stage &to = p_.stages[edge.consumer];
     return hasQueue(edge) && to.cycle == cycle && to.collects();

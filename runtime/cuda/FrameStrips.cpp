@@ -13,7 +13,7 @@
 using namespace piko::cuda;
 using namespace piko::rt;
 
-void Frame::beginStrips(int32_t group, int64_t size) {
+void DeviceFrame::beginStrips(int32_t group, int64_t size) {
   StripRecord &strips = strips_[static_cast<size_t>(group)];
   int64_t all = p_.sources[p_.stripGroups[group].source].count;
   strips.state = exchange_.take<StripState>();
@@ -29,7 +29,7 @@ void Frame::beginStrips(int32_t group, int64_t size) {
     repeat(strips.state->again);
 }
 
-std::vector<StripQueue> Frame::describeLeaving(int32_t group) const {
+std::vector<StripQueue> DeviceFrame::describeLeaving(int32_t group) const {
   std::vector<StripQueue> queues;
   for (size_t e = 0; e < p_.edges.size(); ++e) {
     const Edge &edge = p_.edges[e];
@@ -41,7 +41,7 @@ std::vector<StripQueue> Frame::describeLeaving(int32_t group) const {
 }
 
 /// With those of what comes into loops.
-std::vector<QueueState *> Frame::describeInside(int32_t group) const {
+std::vector<QueueState *> DeviceFrame::describeInside(int32_t group) const {
   std::vector<QueueState *> queues = describeWaiting([&](const Edge &edge) {
     return hasQueue(edge) && !edge.leavesStrips &&
            p_.stages[edge.producer].stripGroup == group;
@@ -52,7 +52,7 @@ std::vector<QueueState *> Frame::describeInside(int32_t group) const {
   return queues;
 }
 
-void Frame::endStrips(int32_t group) {
+void DeviceFrame::endStrips(int32_t group) {
   if (!strips_[static_cast<size_t>(group)].isDivided)
     return;
   std::vector<StripQueue> leaving = describeLeaving(group);

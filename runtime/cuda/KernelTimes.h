@@ -25,9 +25,9 @@ public:
   KernelTimes(const KernelTimes &) = delete;
   KernelTimes &operator=(const KernelTimes &) = delete;
 
-  /// In front of grids that follow each other; throws.
+  /// Before grids that follow each other; throws.
   void begin(CUstream stream);
-  /// Behind one, of a kernel of the pipeline's (-1: of none), or of the
+  /// After one, of a kernel of the pipeline's (-1: of none), or of the
   /// runtime's for it; throws.
   void note(CUstream stream, int32_t kernel, bool isJoin);
   /// When the stream has come to their end: adds their times; throws.
@@ -36,7 +36,7 @@ public:
   void end() noexcept;
 
 private:
-  struct Grid {
+  struct TimedGrid {
     int32_t kernel;
     bool isJoin;
   };
@@ -44,8 +44,8 @@ private:
 
   const Device &device_;
   std::vector<CUevent> events_;
-  size_t used_ = 0;         ///< Events: one more than there are grids.
-  std::vector<Grid> grids_; ///< Since begin().
+  size_t used_ = 0;              ///< Events: one more than there are grids.
+  std::vector<TimedGrid> grids_; ///< Since begin().
 };
 
 } // namespace piko::cuda

@@ -62,7 +62,7 @@ void Device::checkMemory(const std::string &who, CUdeviceptr address,
     Allocation found = find(*this, at);
     if (at != address && found.isHosts())
       fail(std::to_string(end - at) + " of " + std::to_string(bytes) +
-           " bytes from " + hex(address) + " on lie behind the allocation");
+           " bytes from " + hex(address) + " on lie after the allocation");
     if (found.isHosts())
       fail(hex(address) + " is memory of the host");
     if (!found.isManaged && static_cast<int>(found.device) != ordinal)

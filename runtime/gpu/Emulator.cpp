@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Emulator.cpp - A GPU that a thread of the CPU plays ----------------===//
+//===- Emulator.cpp - A GPU that a thread of the CPU emulates
+//----------------===//
 //
 // Blocks run one after the other. The threads of a block take turns, each on a
 // stack of its own, and change at barriers and at operations of warps:

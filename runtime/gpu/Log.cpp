@@ -37,7 +37,7 @@ static int64_t tableBytes(int64_t units) {
 
 namespace {
 
-struct Place {
+struct LogPlace {
   int32_t function, stage;
   const char *name;
   int32_t code;
@@ -67,7 +67,7 @@ struct GridLog {
   bool isSource;
   int64_t units;
   std::span<uint8_t> room;
-  std::vector<Place> places;
+  std::vector<LogPlace> places;
 
 private:
   using Spans = std::vector<pikoir_span>;
@@ -169,7 +169,7 @@ GridLog::Spans GridLog::collect(int64_t unit) const {
 }
 
 void GridLog::fail(const pikoir_entry &entry) {
-  const Place &place = places[static_cast<size_t>(entry.number)];
+  const LogPlace &place = places[static_cast<size_t>(entry.number)];
   int64_t words[3]; // bin, a, b
   std::memcpy(words, &entry + 1, sizeof(words));
   switch (place.function) {
@@ -206,11 +206,11 @@ void GridLog::replay(pikoir_writer *writer, const pikoir_entry &entry) {
                 static_cast<size_t>(writer->ports[port].size));
     return;
   }
-  case PIKOIR_ENTRY_CELL: {
-    int64_t cell = 0;
-    std::memcpy(&cell, &entry + 1, sizeof(cell));
-    return isSource ? pikoir_place_source(writer, cell)
-                    : pikoir_place(writer, port, cell);
+  case PIKOIR_ENTRY_BUCKET: {
+    int64_t bucket = 0;
+    std::memcpy(&bucket, &entry + 1, sizeof(bucket));
+    return isSource ? pikoir_place_source(writer, bucket)
+                    : pikoir_place(writer, port, bucket);
   }
   default:
     return pikoir_next(writer);

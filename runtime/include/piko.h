@@ -16,7 +16,7 @@
 // Would make nothing of emissions, without a word.
 #ifdef emit
 #error "a macro called 'emit' hides a function of Piko: with Qt, define \
-QT_NO_KEYWORDS; else write '#undef emit' in front of this header"
+QT_NO_KEYWORDS; else write '#undef emit' before this header"
 #undef emit
 #endif
 

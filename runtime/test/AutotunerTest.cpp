@@ -28,7 +28,7 @@ std::vector<Mapping> makeMappings(std::initializer_list<bool> expected) {
   return mappings;
 }
 
-/// Units of so many primitives each, in a cell of their own.
+/// Units of so many primitives each, in a bucket of their own.
 std::vector<pikoir_unit> makeUnits(int64_t count, int64_t primitives) {
   std::vector<pikoir_unit> units;
   for (int64_t u = 0; u < count; ++u)

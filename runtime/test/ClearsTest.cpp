@@ -71,9 +71,9 @@ int32_t run(pikort_pipeline *p) {
     EXPECT_EQ(in->clears, launch == 0);
     for (int64_t u = 0; u < in->unit_count; ++u) {
       pikoir_writer *w = pikoir_open(p, 0, u);
-      for (int64_t i = takesLists ? in->units[u].cell_begin
+      for (int64_t i = takesLists ? in->units[u].bucket_begin
                                   : in->units[u].begin;
-           i < (takesLists ? in->units[u].cell_end : in->units[u].end); ++i)
+           i < (takesLists ? in->units[u].bucket_end : in->units[u].end); ++i)
         pikoir_next(w);
       pikoir_close(w);
     }

@@ -193,7 +193,7 @@ void Cuda::SetUp() {
   kernel = "scale";
   strayPointer = false;
   std::iota(numbers.begin(), numbers.end(), 0);
-  pikoTestDriverDefer(0);
+  pikoTestDriverDelay(0);
   pikoTestDriverReset();
 }
 

@@ -132,9 +132,8 @@ TEST_F(CudaMemory, WhatIsNotThere) {
   {
     DeviceNumbers made(out);
     freed = made.address;
-    expectRefused(
-        pipe, {made.address, 5001},
-        {"4 of 20004 bytes from 0x", " on lie behind the allocation"});
+    expectRefused(pipe, {made.address, 5001},
+                  {"4 of 20004 bytes from 0x", " on lie after the allocation"});
     expectRefused(pipe, {made.address + 2, 10},
                   {"a pointer aligned to 4 bytes"});
     expectRefused(pipe, {made.address, size_t(1) << 62},
@@ -243,7 +242,7 @@ TEST_F(CudaMemory, WhereTheHostGoesStepByStep) {
   expectScaled(to.get());
 }
 
-TEST_F(CudaMemory, OneKindBehindTheOther) {
+TEST_F(CudaMemory, OneKindAfterTheOther) {
   HostContext host;
   DeviceNumbers from(numbers), to(out);
   Pipeline pipe{program, Device{0}};

@@ -83,7 +83,7 @@ TEST_F(CudaProgram, NeedsADevice) {
   steps = {stage()};
   Status status = Pipeline{withoutDevice}.created();
   EXPECT_EQ(status.code(), PIKORT_BAD_PROGRAM);
-  expectIn(status, {"expected pikoir_cuda_module in front of "
+  expectIn(status, {"expected pikoir_cuda_module before "
                     "pikoir_cuda_program"});
 }
 

@@ -17,7 +17,7 @@ class CudaStream : public Cuda {
 protected:
   void SetUp() override {
     Cuda::SetUp();
-    pikoTestDriverDefer(1);
+    pikoTestDriverDelay(1);
   }
   static uint64_t launches() {
     PikoTestDriverCounts counts;
@@ -63,7 +63,7 @@ TEST_F(CudaStream, ReturnsBeforeItBegins) {
   expectScaled(scene.to.get());
 }
 
-// Before and behind it in the stream: no call waits.
+// Before and after it in the stream: no call waits.
 TEST_F(CudaStream, IsInTheOrderOfTheStream) {
   Scene scene(program, std::vector<int32_t>(5000));
   void *pinned = nullptr;

@@ -86,7 +86,7 @@ TEST_F(Cuda, TimesOfKernels) {
   EXPECT_GT(time.device, 0);
   ASSERT_EQ(pikort_set_kernel_times(pipe.get(), 1), PIKORT_OK);
   for (bool late : {false, true}) {
-    pikoTestDriverDefer(late);
+    pikoTestDriverDelay(late);
     double before = stats().milliseconds;
     ASSERT_TRUE(pipe.run());
     EXPECT_GT(stats().milliseconds, before);

@@ -104,7 +104,7 @@ TEST(Cycle, WaitsDecideTheOrder) {
   std::vector<Arrivals> first = graph.arrivals;
   graph.stages[0].waits = {1};
   checkOrder(graph);
-  EXPECT_NE(graph.arrivals[2].cells, first[2].cells);
+  EXPECT_NE(graph.arrivals[2].buckets, first[2].buckets);
 }
 
 /// How often the kernels of a graph's stages ran, and on several threads.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- EmulatorTest.cpp - Blocks, threads and warps that the CPU plays ----===//
+//===- EmulatorTest.cpp - Blocks, threads and warps emulated on the CPU
+//----===//
 
 #include "pikort/grid.h"
 #include "pikort/pikort.hpp"
@@ -63,7 +64,7 @@ std::string launch(Shared &state, int64_t blocks, int64_t threads,
 
 } // namespace
 
-// A thread sees at a barrier what those behind it have written.
+// A thread sees at a barrier what those after it have written.
 TEST(Emulator, Barrier) {
   Shared state;
   EXPECT_EQ(launch(state, 1, 64, 0,

@@ -35,7 +35,7 @@ int64_t Graph::tiles(int stage) const {
   return n;
 }
 
-int64_t Graph::cells(int stage) const {
+int64_t Graph::buckets(int stage) const {
   const TestStage &s = stages[stage];
   int64_t n = tiles(stage);
   for (int d = 0; d < 2; ++d)
@@ -48,14 +48,15 @@ std::vector<int64_t> Graph::places(int stage, const Item &item) const {
   if (!(s.flags & PIKOIR_PLACED))
     return {0};
   if (s.runLength > 0)
-    return {(static_cast<int64_t>(item.id) / s.runLength ^ 1) % cells(stage)};
+    return {(static_cast<int64_t>(item.id) / s.runLength ^ 1) % buckets(stage)};
   uint64_t h = mix(item.id, 77 + static_cast<uint64_t>(stage));
   std::vector<int64_t> result;
   auto n = static_cast<int64_t>(h % static_cast<uint64_t>(s.spread + 1));
   result.reserve(static_cast<size_t>(n) + 1);
   for (int64_t i = 0; i < n; ++i)
-    result.push_back(static_cast<int64_t>(mix(h, static_cast<uint64_t>(i)) %
-                                          static_cast<uint64_t>(cells(stage))));
+    result.push_back(
+        static_cast<int64_t>(mix(h, static_cast<uint64_t>(i)) %
+                             static_cast<uint64_t>(buckets(stage))));
   if (n > 0 && h & 256)
     result.push_back(result.front());
   if (h & 512)
@@ -183,7 +184,7 @@ std::pair<size_t, size_t> Graph::stripRange(int source) const {
           return false;
     for (int s : component.stages)
       if (collects(s) && (takesList(s) || !first || component.cyclic ||
-                          (cells(s) > tiles(s) && !stages[s].ports.empty())))
+                          (buckets(s) > tiles(s) && !stages[s].ports.empty())))
         return false;
     return fed == first;
   };
@@ -223,8 +224,8 @@ void Graph::normalise(std::vector<Arrivals> &arrivals) const {
       log.items.clear();
       continue;
     }
-    for (auto &cell : log.cells)
-      std::sort(cell.begin(), cell.end());
+    for (auto &bucket : log.buckets)
+      std::sort(bucket.begin(), bucket.end());
   }
 }
 
@@ -235,7 +236,8 @@ class Model {
 public:
   explicit Model(const Graph &graph) : g_(graph), log_(graph.stages.size()) {
     for (size_t s = 0; s < log_.size(); ++s)
-      log_[s].cells.resize(static_cast<size_t>(g_.cells(static_cast<int>(s))));
+      log_[s].buckets.resize(
+          static_cast<size_t>(g_.buckets(static_cast<int>(s))));
     waiting_.resize(log_.size());
   }
 
@@ -258,20 +260,20 @@ public:
   }
 
 private:
-  using Visit = std::pair<int64_t, Item>; // cell, item
+  using Visit = std::pair<int64_t, Item>; // bucket, item
 
   void arrive(int stage, const Item &item) {
     std::vector<int64_t> named = g_.places(stage, item);
-    std::set<int64_t> cells(named.begin(), named.end());
-    if (cells.empty())
+    std::set<int64_t> buckets(named.begin(), named.end());
+    if (buckets.empty())
       return;
     log_[stage].items.push_back(item.id);
-    for (int64_t cell : cells) {
-      log_[stage].cells[static_cast<size_t>(cell)].push_back(item.id);
+    for (int64_t bucket : buckets) {
+      log_[stage].buckets[static_cast<size_t>(bucket)].push_back(item.id);
       if (g_.collects(stage))
-        waiting_[stage].push_back({cell, item});
+        waiting_[stage].push_back({bucket, item});
       else
-        emit(stage, mix(item.id, static_cast<uint64_t>(cell)), item.hops);
+        emit(stage, mix(item.id, static_cast<uint64_t>(bucket)), item.hops);
     }
   }
 
@@ -293,12 +295,12 @@ private:
     for (size_t i = 0; i < order.size(); ++i)
       visits[i] = unsorted[order[i]];
     if (!g_.takesList(s)) {
-      for (auto &[cell, item] : visits)
-        emit(s, mix(item.id, static_cast<uint64_t>(cell)), item.hops);
+      for (auto &[bucket, item] : visits)
+        emit(s, mix(item.id, static_cast<uint64_t>(bucket)), item.hops);
       return;
     }
     size_t next = 0;
-    for (int64_t bin = 0; bin < g_.cells(s); ++bin) {
+    for (int64_t bin = 0; bin < g_.buckets(s); ++bin) {
       size_t begin = next;
       while (next < visits.size() && visits[next].first == bin)
         ++next;
@@ -361,7 +363,7 @@ Graph Graph::random(uint64_t seed, int stageCount, int64_t items) {
       stage.everyBin = draw(2);
     }
     stage.perBin = draw(4) == 0;
-    stage.deferred = draw(4) == 0;
+    stage.reordered = draw(4) == 0;
     stage.spread = draw(4) ? 3 : 1;
     int ports = s + 1 < stageCount ? 1 + draw(3) : 0;
     for (int i = 0; i < ports; ++i)
@@ -407,7 +409,7 @@ void piko::rt::test::checkArrivals(Graph &graph,
   for (size_t s = 0; s < expected.size(); ++s) {
     ASSERT_EQ(graph.arrivals[s].items, expected[s].items)
         << "stage " << s << ", " << what;
-    ASSERT_EQ(graph.arrivals[s].cells, expected[s].cells)
+    ASSERT_EQ(graph.arrivals[s].buckets, expected[s].buckets)
         << "stage " << s << ", " << what;
     ASSERT_EQ(graph.arrivals[s].calls, expected[s].calls)
         << "stage " << s << ", " << what;

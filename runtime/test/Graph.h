@@ -2,7 +2,7 @@
 //===- Graph.h - Test pipelines, and what they mean -----------------------===//
 //
 // A Graph is a pipeline whose stages do what a hash of their input says: how
-// much is emitted, to which ports, into which cells. It runs in two ways:
+// much is emitted, to which ports, into which buckets. It runs in two ways:
 //
 //   model()  the meaning: recursive and sequential, as docs/Language.md has it;
 //   run()    through the ABI, with kernels like those the compiler makes.
@@ -39,12 +39,12 @@ struct TestStage {
   int64_t batch = 0;      ///< Of lists; 0 = the whole list.
   bool everyBin = false;  ///< Of lists.
   bool perBin = false;    ///< The schedule depends on the bin.
-  bool deferred = false;  ///< Emits from iterations that take turns.
+  bool reordered = false; ///< Emits from iterations that take turns.
   std::vector<int> ports; ///< Consumer of each port.
   std::vector<int> waits; ///< Stages that it waits for.
   int spread = 3;         ///< Most places of one primitive, plus one.
   int mostEmissions = 2;  ///< Of one call.
-  int64_t runLength = 0;  ///< If not 0: ids in runs share a cell, swapped.
+  int64_t runLength = 0;  ///< If not 0: ids in runs share a bucket, swapped.
 };
 
 /// Stages on a common cycle, or one stage.
@@ -71,8 +71,8 @@ struct TestPlan {
 
 /// What reached a stage.
 struct Arrivals {
-  std::vector<uint64_t> items;              ///< In any order.
-  std::vector<std::vector<uint64_t>> cells; ///< In each cell, in order.
+  std::vector<uint64_t> items;                ///< In any order.
+  std::vector<std::vector<uint64_t>> buckets; ///< In each bucket, in order.
   std::vector<uint64_t> calls; ///< Of lists: a hash of each, in order.
   bool operator==(const Arrivals &) const = default;
 };
@@ -92,7 +92,7 @@ struct Graph {
   bool paddingSeen = false;
 
   int64_t tiles(int stage) const;
-  int64_t cells(int stage) const;
+  int64_t buckets(int stage) const;
   /// The places of an item in a stage, in the order in which they are named;
   /// with repetitions.
   std::vector<int64_t> places(int stage, const Item &item) const;
@@ -118,7 +118,7 @@ struct Graph {
   /// The stages that can take a source in strips.
   std::vector<int> stripStages(int source) const;
   /// What tests may compare: a loop's stages take their primitives in any
-  /// order, unless that can be seen; then only that in each cell is compared.
+  /// order, unless that can be seen; then only that in each bucket is compared.
   void normalise(std::vector<Arrivals> &arrivals) const;
 
   /// Runs the meaning; returns what reached each stage.

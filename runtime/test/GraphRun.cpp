@@ -80,28 +80,29 @@ static void write(pikoir_writer *w, int stage, int32_t port, const Item &item,
   room->check = item.check;
   int consumer = current->stages[stage].ports[port];
   if (current->stages[consumer].flags & PIKOIR_PLACED)
-    for (int64_t cell : current->places(consumer, item))
-      fast ? pikoir_place_inline(w, port, cell) : pikoir_place(w, port, cell);
+    for (int64_t bucket : current->places(consumer, item))
+      fast ? pikoir_place_inline(w, port, bucket)
+           : pikoir_place(w, port, bucket);
 }
 
 /// All emissions of a call, two from each iteration: first one from each, in
 /// order, then, after a barrier, the other from each, in reverse.
-static void writeDeferred(pikoir_writer *w, int stage,
-                          const std::vector<std::pair<int, Item>> &emissions) {
+static void writeReordered(pikoir_writer *w, int stage,
+                           const std::vector<std::pair<int, Item>> &emissions) {
   auto count = static_cast<int64_t>(emissions.size());
   int64_t iterations = (count + 1) / 2;
   auto emit = [&](int64_t iteration, int64_t i) {
-    pikoir_defer_iteration(w, iteration);
+    pikoir_reorder_iteration(w, iteration);
     auto &[port, item] = emissions[static_cast<size_t>(i)];
     write(w, stage, port, item, i & 2);
   };
-  pikoir_defer_begin(w, iterations);
+  pikoir_reorder_begin(w, iterations);
   for (int64_t i = 0; i < iterations; ++i)
     emit(i, 2 * i);
   for (int64_t i = iterations - 1; i >= 0; --i)
     if (2 * i + 1 < count)
       emit(i, 2 * i + 1);
-  pikoir_defer_end(w);
+  pikoir_reorder_end(w);
 }
 
 static uint64_t callSeed(const pikoir_input *in, const pikoir_call &call) {
@@ -121,22 +122,22 @@ static void runUnit(pikort_pipeline *p, int stage, const pikoir_input *in,
   pikoir_writer *w = pikoir_open(p, stage, u);
   auto emit = [&](uint64_t seed, int hops) {
     auto emissions = current->emissions(stage, seed, hops);
-    if (s.deferred)
-      writeDeferred(w, stage, emissions);
+    if (s.reordered)
+      writeReordered(w, stage, emissions);
     else
       for (auto &[port, item] : emissions)
         write(w, stage, port, item, fast);
     fast ? pikoir_next_inline(w) : pikoir_next(w);
   };
-  int64_t cell = unit.cell_begin;
+  int64_t bucket = unit.bucket_begin;
   for (int64_t i = unit.begin; i < unit.end && !in->calls; ++i) {
-    while (in->offsets[cell + 1] <= i)
-      ++cell;
+    while (in->offsets[bucket + 1] <= i)
+      ++bucket;
     const Item &item = items[in->order ? in->order[i] : i];
-    emit(mix(item.id, static_cast<uint64_t>(cell)), item.hops);
+    emit(mix(item.id, static_cast<uint64_t>(bucket)), item.hops);
   }
-  for (; in->calls && cell < unit.cell_end; ++cell) {
-    const pikoir_call &call = in->calls[cell];
+  for (; in->calls && bucket < unit.bucket_end; ++bucket) {
+    const pikoir_call &call = in->calls[bucket];
     int hops = 0;
     for (int64_t i = call.begin; i < call.end; ++i)
       hops = std::max<int>(hops, items[in->order ? in->order[i] : i].hops);
@@ -151,27 +152,29 @@ static void note(int stage, const pikoir_input *in) {
   auto *items = reinterpret_cast<const Item *>(in->items);
   EXPECT_EQ(in->tiles, current->tiles(stage));
   std::set<int64_t> seen;
-  auto noteCells = [&](int64_t begin, int64_t end) {
+  auto noteBuckets = [&](int64_t begin, int64_t end) {
     for (int64_t c = begin; c < end; ++c)
       for (int64_t i = in->offsets[c]; i < in->offsets[c + 1]; ++i) {
         int64_t item = in->order ? in->order[i] : i;
         seen.insert(item);
-        log.cells[static_cast<size_t>(c)].push_back(items[item].id);
+        log.buckets[static_cast<size_t>(c)].push_back(items[item].id);
         EXPECT_EQ(items[item].check, ~items[item].id);
         static const char zeros[7] = {};
         current->paddingSeen |=
             std::memcmp(&items[item].hops + 1, zeros, sizeof(zeros)) != 0;
       }
   };
-  int64_t cell = 0; // up to which cells are noted; several units may share one
+  int64_t bucket =
+      0; // up to which buckets are noted; several units may share one
   for (int64_t u = 0; u < in->unit_count && !in->calls; ++u) {
-    noteCells(std::max(cell, in->units[u].cell_begin), in->units[u].cell_end);
-    cell = in->units[u].cell_end;
+    noteBuckets(std::max(bucket, in->units[u].bucket_begin),
+                in->units[u].bucket_end);
+    bucket = in->units[u].bucket_end;
   }
   for (int64_t c = 0; c < in->call_count; ++c)
     if (c == 0 || in->calls[c].bin != in->calls[c - 1].bin) {
       int64_t tiles = in->tiles, bin = in->calls[c].bin;
-      noteCells(bin * tiles, (bin + 1) * tiles);
+      noteBuckets(bin * tiles, (bin + 1) * tiles);
     }
   for (int64_t item : seen)
     log.items.push_back(items[item].id);
@@ -183,9 +186,9 @@ static void note(int stage, const pikoir_input *in) {
     EXPECT_EQ(unit.begin, position);
     position = unit.end;
     if (list) {
-      EXPECT_EQ(unit.cell_begin, next);
-      next = unit.cell_end;
-      EXPECT_EQ(in->calls[unit.cell_begin].begin, unit.begin);
+      EXPECT_EQ(unit.bucket_begin, next);
+      next = unit.bucket_end;
+      EXPECT_EQ(in->calls[unit.bucket_begin].begin, unit.begin);
       EXPECT_EQ(in->calls[next - 1].end, unit.end);
       bool splits = (current->stages[stage].flags &
                      (PIKOIR_SPLIT | PIKOIR_ORDERED)) == PIKOIR_SPLIT;
@@ -193,12 +196,12 @@ static void note(int stage, const pikoir_input *in) {
         EXPECT_LT(in->calls[next - 1].bin, in->calls[next].bin);
       continue;
     }
-    EXPECT_GE(unit.begin, in->offsets[unit.cell_begin]);
-    EXPECT_LE(unit.end, in->offsets[unit.cell_end]);
-    if (unit.cell_end - unit.cell_begin > 1 ||
+    EXPECT_GE(unit.begin, in->offsets[unit.bucket_begin]);
+    EXPECT_LE(unit.end, in->offsets[unit.bucket_end]);
+    if (unit.bucket_end - unit.bucket_begin > 1 ||
         current->stages[stage].flags & PIKOIR_ORDERED) {
-      EXPECT_EQ(unit.begin, in->offsets[unit.cell_begin]);
-      EXPECT_EQ(unit.end, in->offsets[unit.cell_end]);
+      EXPECT_EQ(unit.begin, in->offsets[unit.bucket_begin]);
+      EXPECT_EQ(unit.end, in->offsets[unit.bucket_end]);
     }
   }
   EXPECT_EQ(position, in->count);
@@ -220,8 +223,8 @@ static int32_t assignSource(pikort_pipeline *p, int32_t source) {
   for (int64_t u = 0; u < in->unit_count; ++u) {
     pikoir_writer *w = pikoir_open_source(p, source, u);
     for (int64_t i = in->units[u].begin; i < in->units[u].end; ++i) {
-      for (int64_t cell : current->places(current->sources[source], items[i]))
-        pikoir_place_source(w, cell);
+      for (int64_t bucket : current->places(current->sources[source], items[i]))
+        pikoir_place_source(w, bucket);
       pikoir_next(w);
     }
     pikoir_close(w);
@@ -243,7 +246,7 @@ static int32_t runStage(pikort_pipeline *p, int32_t stage) {
 
 static void scheduleBins(pikort_pipeline *p, int32_t stage) {
   int64_t bins = pikoir_begin_schedule(p, stage);
-  EXPECT_EQ(bins, current->cells(stage) / current->tiles(stage));
+  EXPECT_EQ(bins, current->buckets(stage) / current->tiles(stage));
   for (int64_t bin = 0; bin < bins; ++bin) {
     int64_t batch =
         current->takesList(stage) ? current->batchOf(stage, bin) : 0;
@@ -257,7 +260,7 @@ static bool isPlaced(size_t source) {
   return current->stages[current->sources[source]].flags & PIKOIR_PLACED;
 }
 
-/// The parts of a cycle that do not collect, each behind those that emit into
+/// The parts of a cycle that do not collect, each after those that emit into
 /// it.
 static std::vector<int32_t> sortParts(const TestComponent &component) {
   std::vector<int32_t> parts, sorted;
@@ -353,8 +356,8 @@ static int32_t runGraph(pikort_pipeline *p) {
   current->arrivals.assign(current->stages.size(), {});
   current->paddingSeen = false;
   for (size_t s = 0; s < current->stages.size(); ++s)
-    current->arrivals[s].cells.resize(
-        static_cast<size_t>(current->cells(static_cast<int>(s))));
+    current->arrivals[s].buckets.resize(
+        static_cast<size_t>(current->buckets(static_cast<int>(s))));
   for (size_t s = 0; s < current->stages.size(); ++s)
     if (current->stages[s].perBin)
       scheduleBins(p, static_cast<int32_t>(s));

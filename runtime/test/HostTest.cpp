@@ -259,9 +259,9 @@ TEST_F(Host, BadDomains) {
   bindAll();
   ASSERT_TRUE(pipe.domain({PIKORT_MAX_EXTENT, PIKORT_MAX_EXTENT}));
   expectError(pipe.run(), PIKORT_TOO_MANY,
-              "stage 'bin': expected fewer than 2147483647 cells, but the "
+              "stage 'bin': expected fewer than 2147483647 buckets, but the "
               "domain has more");
-  // Few enough cells, but an image that no machine holds.
+  // Few enough buckets, but an image that no machine holds.
   ASSERT_TRUE(pipe.memoryLimit(1 << 20));
   ASSERT_TRUE(pipe.domain({60000, 60000}));
   expectError(pipe.run(), PIKORT_OUT_OF_MEMORY,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- LocalTest.cpp - Stages behind local edges --------------------------===//
+//===- LocalTest.cpp - Stages after local edges --------------------------===//
 //
-// "work" has 20 bins of 4 cells and emits each primitive `copies` times to
+// "work" has 20 bins of 4 buckets and emits each primitive `copies` times to
 // "list", which gets it in batches of 2, and once to "drain". "list" hands each
 // batch on to "again", and a record of its own for each call to "drain";
 // "again" hands all on to "drain". So drain merges three edges, of stages in
@@ -25,7 +25,7 @@ namespace {
 /// With padding, which must come out as zero.
 struct Item {
   int64_t id;
-  int8_t cell;
+  int8_t bucket;
 };
 
 enum { work, list, again, drain };
@@ -42,7 +42,7 @@ void declare(pikort_pipeline *p) {
   pikoir_declare_pipeline(p, "Local", 1);
   pikoir_declare_record(p, 0, "Item", sizeof(Item), alignof(Item));
   pikoir_declare_field(p, 0, "id", PIKORT_I64, 0, 1, 0);
-  pikoir_declare_field(p, 0, "cell", PIKORT_I8, 8, 1, 0);
+  pikoir_declare_field(p, 0, "bucket", PIKORT_I8, 8, 1, 0);
   int64_t size = 4;
   int32_t placed = PIKOIR_PLACED;
   pikoir_declare_stage(p, work, "work", 0, &size, 0, 0, placed, 0);
@@ -72,17 +72,17 @@ void setup(pikort_pipeline *p) {
   pikoir_declare_local(p, work, 0);
 }
 
-void emit(pikoir_writer *w, int32_t port, int64_t id, int64_t cell,
+void emit(pikoir_writer *w, int32_t port, int64_t id, int64_t bucket,
           bool place) {
   auto *room = reinterpret_cast<Item *>(pikoir_append_inline(w, port));
   room->id = id;
-  room->cell = static_cast<int8_t>(cell);
+  room->bucket = static_cast<int8_t>(bucket);
   if (!place)
     return;
   if (w->ports[port].flags & PIKOIR_PORT_LOCAL)
-    pikoir_place_local_inline(w, port, cell);
+    pikoir_place_local_inline(w, port, bucket);
   else
-    pikoir_place_inline(w, port, cell);
+    pikoir_place_inline(w, port, bucket);
 }
 
 const Item &itemAt(const pikoir_input *in, int64_t position) {
@@ -96,17 +96,18 @@ void fail(pikort_pipeline *p, int32_t stage) {
 }
 
 void runBin(pikort_pipeline *p, pikoir_writer *const (&writers)[3],
-            int64_t cell) {
+            int64_t bucket) {
   const pikoir_input *in = pikoir_begin_local(writers[work], 0);
-  for (int64_t c = in->units[0].cell_begin; c < in->units[0].cell_end; ++c) {
+  for (int64_t c = in->units[0].bucket_begin; c < in->units[0].bucket_end;
+       ++c) {
     const pikoir_call &call = in->calls[c];
     {
       std::lock_guard<std::mutex> lock(mutex);
-      calls[static_cast<size_t>(cell)].insert(call.end - call.begin);
+      calls[static_cast<size_t>(bucket)].insert(call.end - call.begin);
     }
     for (int64_t i = call.begin; i < call.end; ++i)
-      emit(writers[list], 0, itemAt(in, i).id, cell, true);
-    emit(writers[list], 1, 1000000 + cell, cell, false);
+      emit(writers[list], 0, itemAt(in, i).id, bucket, true);
+    emit(writers[list], 1, 1000000 + bucket, bucket, false);
     fail(p, list);
   }
   pikoir_next(writers[list]);
@@ -117,7 +118,7 @@ void runBin(pikort_pipeline *p, pikoir_writer *const (&writers)[3],
     for (size_t b = 9; b < sizeof(Item); ++b)
       if (reinterpret_cast<const char *>(&itemAt(in, i))[b] != 0)
         paddingSeen = true;
-    emit(writers[again], 0, 2000000 + itemAt(in, i).id, cell, false);
+    emit(writers[again], 0, 2000000 + itemAt(in, i).id, bucket, false);
   }
   pikoir_next(writers[again]);
   pikoir_end_local(writers[list], 0);
@@ -132,7 +133,8 @@ int32_t runWork(pikort_pipeline *p) {
     pikoir_writer *const writers[3] = {pikoir_open(p, work, u),
                                        pikoir_open(p, list, u),
                                        pikoir_open(p, again, u)};
-    for (int64_t c = in->units[u].cell_begin; c < in->units[u].cell_end; ++c) {
+    for (int64_t c = in->units[u].bucket_begin; c < in->units[u].bucket_end;
+         ++c) {
       for (int64_t i = in->offsets[c]; i < in->offsets[c + 1]; ++i) {
         for (int64_t k = 0; k < copies; ++k)
           emit(writers[work], 0, itemAt(in, i).id * 10 + k, c, k != 2);
@@ -156,7 +158,7 @@ int32_t run(pikort_pipeline *p) {
   for (int64_t u = 0; u < in->unit_count; ++u) {
     pikoir_writer *w = pikoir_open_source(p, 0, u);
     for (int64_t i = in->units[u].begin; i < in->units[u].end; ++i) {
-      pikoir_place_source(w, itemAt(in, i).cell);
+      pikoir_place_source(w, itemAt(in, i).bucket);
       pikoir_next(w);
     }
     pikoir_close(w);
@@ -204,17 +206,17 @@ protected:
     std::vector<int64_t> first, second, third;
     for (const Item &item : input)
       first.push_back(item.id);
-    for (int64_t cell = 0; cell < bins; ++cell) {
+    for (int64_t bucket = 0; bucket < bins; ++bucket) {
       int64_t count = 0;
       for (const Item &item : input)
-        for (int64_t k = 0; item.cell == cell && k < copies; ++k)
+        for (int64_t k = 0; item.bucket == bucket && k < copies; ++k)
           if (k != 2) {
             ++count;
             third.push_back(2000000 + item.id * 10 + k);
           }
       second.insert(second.end(),
                     static_cast<size_t>(count ? (count + 1) / 2 : everyBin),
-                    1000000 + cell);
+                    1000000 + bucket);
     }
     first.insert(first.end(), second.begin(), second.end());
     first.insert(first.end(), third.begin(), third.end());

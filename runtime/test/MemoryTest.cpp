@@ -30,7 +30,7 @@ static Graph makeGraph(int64_t items) {
   return graph;
 }
 
-/// Two loops, one of them in rounds, and lists with deferred emissions.
+/// Two loops, one of them in rounds, and lists with reordered emissions.
 static Graph makeCyclicGraph() {
   Graph graph = makeGraph(200);
   for (TestStage &stage : graph.stages)
@@ -40,7 +40,7 @@ static Graph makeCyclicGraph() {
   graph.stages[1].flags |= PIKOIR_ORDERED;
   graph.stages[2].tile = 0;
   graph.stages[2].flags |= PIKOIR_LIST;
-  graph.stages[2].deferred = true;
+  graph.stages[2].reordered = true;
   graph.stages[2].ports = {3, 1};
   graph.mostHops = 6;
   return graph;

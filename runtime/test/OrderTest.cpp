@@ -36,7 +36,7 @@ TEST(Order, PermutesBackByItem) {
   checkOrder(graph);
 }
 
-// Every primitive in just one cell takes the shorter way.
+// Every primitive in just one bucket takes the shorter way.
 TEST(Order, PermutesSinglePlaces) {
   TestStage binned;
   binned.bin[0] = binned.bin[1] = 4;
@@ -47,7 +47,7 @@ TEST(Order, PermutesSinglePlaces) {
   checkOrder(graph);
 }
 
-// Each chunk of the count is sorted by cell, but the chunks are not.
+// Each chunk of the count is sorted by bucket, but the chunks are not.
 TEST(Order, SortedInPieces) {
   TestStage runs;
   runs.bin[0] = 4;
@@ -71,8 +71,8 @@ TEST(Order, MergesTilesOfCollectingStages) {
   checkOrder(graph);
 }
 
-// A stage that processes lists calls pikoir_next once for each cell, for empty
-// cells too; its emissions meet others in a join, so they need keys.
+// A stage that processes lists calls pikoir_next once for each bucket, for
+// empty buckets too; its emissions meet others in a join, so they need keys.
 TEST(Order, ListsJoinWithPrimitives) {
   TestStage list;
   list.bin[0] = list.bin[1] = 3;
@@ -162,8 +162,8 @@ TEST(Order, UnorderedKeepsTheMultiset) {
   }
 }
 
-// A record whose cells do not fit into one block of the log, named downwards.
-TEST(Order, ManyCellsOfOnePrimitive) {
+// A record whose buckets do not fit into one block of the log, named downwards.
+TEST(Order, ManyBucketsOfOnePrimitive) {
   TestStage first;
   TestStage fine;
   fine.bin[0] = fine.bin[1] = 1;

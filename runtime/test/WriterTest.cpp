@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- WriterTest.cpp - Deferred emissions, scratch, schedules ------------===//
+//===- WriterTest.cpp - Reordered emissions, scratch, schedules
+//------------===//
 
 #include "pikort/abi.h"
 #include "pikort/pikort.hpp"
@@ -64,12 +65,12 @@ int32_t run(pikort_pipeline *p) {
   return pikoir_end(p, 1);
 }
 
-void emit(pikoir_writer *w, int64_t id, int64_t cell, bool fast = false) {
+void emit(pikoir_writer *w, int64_t id, int64_t bucket, bool fast = false) {
   auto *room = reinterpret_cast<Item *>(fast ? pikoir_append_inline(w, 0)
                                              : pikoir_append(w, 0));
   room->id = id;
   room->kind = 1;
-  fast ? pikoir_place_inline(w, 0, cell) : pikoir_place(w, 0, cell);
+  fast ? pikoir_place_inline(w, 0, bucket) : pikoir_place(w, 0, bucket);
 }
 
 const pikort_program program{PIKORT_ABI_VERSION, "Writer", setup, run};
@@ -100,48 +101,48 @@ protected:
   piko::rt::Pipeline pipe{program};
 };
 
-// --- Deferred emissions -----------------------------------------------------
+// --- Reordered emissions -----------------------------------------------------
 
-TEST_F(Writer, DefersByIteration) {
+TEST_F(Writer, ReordersByIteration) {
   runWith([](pikoir_writer *w) {
     emit(w, -1, 0, true);
-    pikoir_defer_begin(w, 3);
+    pikoir_reorder_begin(w, 3);
     for (int64_t round = 0; round < 2; ++round)
       for (int64_t i : {2, 0, 1}) {
-        pikoir_defer_iteration(w, i);
+        pikoir_reorder_iteration(w, i);
         emit(w, 10 * i + round, 0, round == 0);
       }
-    pikoir_defer_end(w);
+    pikoir_reorder_end(w);
     emit(w, 99, 0, true);
   });
   EXPECT_EQ(drained, (std::vector<int64_t>{-1, 0, 1, 10, 11, 20, 21, 99}));
 }
 
-// Cells stay with their record; one without a cell is dropped.
-TEST_F(Writer, DefersPlaces) {
+// Buckets stay with their record; one without a bucket is dropped.
+TEST_F(Writer, ReordersPlaces) {
   runWith([](pikoir_writer *w) {
-    pikoir_defer_begin(w, 2);
-    pikoir_defer_iteration(w, 1);
+    pikoir_reorder_begin(w, 2);
+    pikoir_reorder_iteration(w, 1);
     emit(w, 5, 3);
     pikoir_place_inline(w, 0, 1);
     pikoir_append_inline(w, 0);
-    pikoir_defer_iteration(w, 0);
+    pikoir_reorder_iteration(w, 0);
     emit(w, 4, 1);
-    pikoir_defer_end(w);
+    pikoir_reorder_end(w);
   });
   EXPECT_EQ(drained, (std::vector<int64_t>{4, 5, 5}));
 }
 
-TEST_F(Writer, DefersMany) {
+TEST_F(Writer, ReordersMany) {
   constexpr int64_t count = 200000;
   runWith([](pikoir_writer *w) {
     for (int repeat = 0; repeat < 2; ++repeat) {
-      pikoir_defer_begin(w, count);
+      pikoir_reorder_begin(w, count);
       for (int64_t i = count; i-- > 0;) {
-        pikoir_defer_iteration(w, i);
+        pikoir_reorder_iteration(w, i);
         emit(w, i, 0);
       }
-      pikoir_defer_end(w);
+      pikoir_reorder_end(w);
     }
   });
   ASSERT_EQ(drained.size(), size_t(2 * count));
@@ -149,7 +150,7 @@ TEST_F(Writer, DefersMany) {
     ASSERT_EQ(drained[static_cast<size_t>(i)], i % count);
 }
 
-TEST_F(Writer, WrongCallsOfDefer) {
+TEST_F(Writer, WrongCallsOfReorder) {
   auto expect = [&](std::function<void(pikoir_writer *)> wrong,
                     const char *text) {
     EXPECT_EQ(runWith(wrong, PIKORT_BAD_PROGRAM),
@@ -157,39 +158,39 @@ TEST_F(Writer, WrongCallsOfDefer) {
   };
   expect(
       [](pikoir_writer *w) {
-        pikoir_defer_begin(w, 1);
-        pikoir_defer_begin(w, 1);
-        pikoir_defer_end(w);
+        pikoir_reorder_begin(w, 1);
+        pikoir_reorder_begin(w, 1);
+        pikoir_reorder_end(w);
       },
-      "expected deferred emissions to end before others begin");
-  expect([](pikoir_writer *w) { pikoir_defer_end(w); },
-         "expected pikoir_defer_begin before an iteration and the end");
+      "expected reordered emissions to end before others begin");
+  expect([](pikoir_writer *w) { pikoir_reorder_end(w); },
+         "expected pikoir_reorder_begin before an iteration and the end");
   for (int64_t bad : {-1, 2})
     expect(
         [=](pikoir_writer *w) {
-          pikoir_defer_begin(w, 2);
-          pikoir_defer_iteration(w, bad);
-          pikoir_defer_end(w);
+          pikoir_reorder_begin(w, 2);
+          pikoir_reorder_iteration(w, bad);
+          pikoir_reorder_end(w);
         },
-        "expected an iteration of those that pikoir_defer_begin named");
-  expect([](pikoir_writer *w) { pikoir_defer_begin(w, 2); },
-         "expected pikoir_defer_end before the position ends");
+        "expected an iteration of those that pikoir_reorder_begin named");
+  expect([](pikoir_writer *w) { pikoir_reorder_begin(w, 2); },
+         "expected pikoir_reorder_end before the position ends");
   expect(
       [](pikoir_writer *w) {
-        pikoir_defer_begin(w, 1);
+        pikoir_reorder_begin(w, 1);
         pikoir_place(w, 0, 0);
-        pikoir_defer_end(w);
+        pikoir_reorder_end(w);
       },
       "expected a record before its place");
 }
 
 // The error of a place is found though it is late.
-TEST_F(Writer, DefersBadPlaces) {
+TEST_F(Writer, ReordersBadPlaces) {
   EXPECT_EQ(runWith(
                 [](pikoir_writer *w) {
-                  pikoir_defer_begin(w, 1);
+                  pikoir_reorder_begin(w, 1);
                   emit(w, 1, 4, true);
-                  pikoir_defer_end(w);
+                  pikoir_reorder_end(w);
                 },
                 PIKORT_BIN_OUTSIDE),
             "stage 'drain': expected a bin id in [0, 4), but got 4");
@@ -199,7 +200,7 @@ TEST_F(Writer, DefersBadPlaces) {
 
 // --- Reserved room ----------------------------------------------------------
 
-// As many as there is room for lie one behind the other, across blocks.
+// As many as there is room for lie one after the other, across blocks.
 TEST_F(Writer, ReservesRoom) {
   constexpr int64_t rounds = 3000;
   runWith([](pikoir_writer *w) {
@@ -216,7 +217,7 @@ TEST_F(Writer, ReservesRoom) {
       }
       for (int64_t i = 0; i < count; ++i) {
         ++port.emitted;
-        port.last_cell = -1;
+        port.last_bucket = -1;
         pikoir_place(w, 0, 0);
       }
       id += count;

@@ -2,7 +2,7 @@
 //
 // Records with several arrays, whose elements are reached with constant parts
 // of the address that point into another array: before the first element,
-// behind the last one, and back.
+// after the last one, and back.
 // RUN: %compare_targets %s --count 64 | FileCheck %s
 // CHECK: equal
 #include <piko.h>

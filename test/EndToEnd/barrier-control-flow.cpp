@@ -41,7 +41,7 @@ struct Mix : piko::Stage<16, 16, 64, Point, Point>, piko::Uses<State> {
       float mine[4] = {p.value, 2 * p.value, 3 * p.value, 0};
       shared[i % 64] = p.value;
       sync();
-      // The test of this loop comes behind barriers.
+      // The test of this loop comes after barriers.
       int round = 0;
       float sum = 0;
       do {

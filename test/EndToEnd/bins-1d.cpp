@@ -5,7 +5,7 @@
 // REQUIRES: all
 // RUN: %compare_targets %s --domain 53 --count 500 --runs 1 | FileCheck %s
 // CHECK: equal
-// RUN: %cxx_behind_header -Wall -Wextra -Werror -DMAIN %s -o %t && %t | FileCheck %s --check-prefix=REFERENCE
+// RUN: %cxx_after_header -Wall -Wextra -Werror -DMAIN %s -o %t && %t | FileCheck %s --check-prefix=REFERENCE
 // REFERENCE: 7 22 53
 //
 // The host of a compiled one does the same.

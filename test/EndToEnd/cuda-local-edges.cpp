@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What stages behind local edges emit, and the one in front of them, is merged
+// What stages after local edges emit, and the one before them, is merged
 // with others by its lineage, in one submission.
 // REQUIRES: all
 // DEFINE: %{compare} = piko-compare %s --count 300 --domain 67 35 --runs 2 --threads 2 --target cuda --gpu-threads 64
@@ -41,7 +41,7 @@ struct Spread : piko::Stage<8, 8, 64, Point, Point, Point> {
 // Those with an odd tag first.
 struct Sort : piko::Stage<8, 8, 64, Point, Point, Point> {
   void assignBin(const Point &p) {
-    if (p.tag % 7 != 3) // may stay behind
+    if (p.tag % 7 != 3) // may stay after
       assignToPreviousBins(p);
   }
   void schedule(piko::BinId) {

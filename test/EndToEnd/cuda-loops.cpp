@@ -93,7 +93,7 @@ struct Entries : piko::Pipe<State> {
   }
 };
 
-// No kernel is in front of the loop.
+// No kernel is before the loop.
 struct Halve : piko::Stage<0, 0, 64, Point, Point, Point> {
   void process(const Point &p) {
     emit(moved(p, 1, 0, p.value, p.tag), 1);

@@ -120,7 +120,7 @@ struct Tiles : piko::Pipe<State> {
   }
 };
 
-// Two groups of strips, one behind the other.
+// Two groups of strips, one after the other.
 struct Turn : piko::Stage<0, 0, 64, Point, Point> {
   void process(const Point &p) { emit(moved(p, 1, p.tag, p.value, p.tag)); }
 };

@@ -134,7 +134,7 @@ struct NeighboursStage : Points<> {
 };
 struct Neighbours : Alone<NeighboursStage> {};
 
-// What is read is stored to behind it, by the same update.
+// What is read is stored to after it, by the same update.
 struct StoresStage : Points<8> {
   void process(const Particle &p) {
     update(state().image, glm::ivec2(p.x, p.y), [&](Pixel &pixel) {
@@ -149,7 +149,7 @@ struct StoresStage : Points<8> {
 };
 struct Stores : Alone<StoresStage> {};
 
-// An element that only turns of the loop may read.
+// An element that only iterations of the loop may read.
 struct Element {
   int x, y;
   float value;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What a phase computes of a primitive in front of its own loops, said in many
+// What a phase computes of a primitive before its own loops, said in many
 // ways: the pixels of the reference executor, whether it is computed for many
-// primitives at once or for one. What is behind a condition is computed for all,
+// primitives at once or for one. What is under a condition is computed for all,
 // but for what the condition says can be read.
 // REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
@@ -20,7 +20,7 @@
 // CASE: --pipe Planes --domain 167 93 --count 1
 //
 // RUN: pikoc %s --pipe Discs,Ellipses,Stripes,Kinds,Divides,Narrow,Reads,Seldom,Planes --remarks --cpu x86-64-v4 --emit=target -o /dev/null 2>&1 | FileCheck %s
-// CHECK-COUNT-9: remark: stage 'stage': what follows from a primitive in front of the loops of its turn is computed for 16 primitives at once
+// CHECK-COUNT-9: remark: stage 'stage': what follows from a primitive before the loops of its iteration is computed for 16 primitives at once
 // CHECK-NOT: what follows from a primitive
 #include <piko.h>
 
@@ -93,7 +93,7 @@ struct DrawDiscs : Draw<DrawDiscs> {
 };
 struct Discs : Pipe<DrawDiscs> {};
 
-// A test, and what is left of the phase behind it.
+// A test, and what is left of the phase after it.
 struct DrawReturns : Draw<DrawReturns> {
   void process(const Shape &s) {
     float a = lengthOf(float(s.w), float(s.h)), b = float(s.slope) / (a + 1.0f);

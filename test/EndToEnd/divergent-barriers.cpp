@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Iterations that do not all come to a barrier are an error, and nothing behind
+// Iterations that do not all come to a barrier are an error, and nothing after
 // it runs: not what the barrier's branch guards, nor a loop that others leave.
 // REQUIRES: all
 // RUN: %compare_targets %s --stops --pipe Guarded --runs 1 --threads 1 2 | FileCheck %s
@@ -31,7 +31,7 @@ struct Guarded : piko::Pipe<State> {
   Guarded() { source(stage); }
 };
 
-/// Iteration 0 stays in the loop, and what would let it go is behind a barrier.
+/// Iteration 0 stays in the loop, and what would let it go is after a barrier.
 struct LeaveLoop : piko::Stage<0, 0, 32, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &list) {
     int rounds[4] = {3, 1, 2, 3};
@@ -56,7 +56,7 @@ struct Loops : piko::Pipe<State> {
   Loops() { source(stage); }
 };
 
-/// The second loop's bound is only known behind the first barrier.
+/// The second loop's bound is only known after the first barrier.
 struct CountAgain : piko::Stage<0, 0, 32, Point>, piko::Uses<State> {
   void process(const piko::List<Point> &list) {
     parallelFor(int(list.size()), [&](int i) {

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// A stage with a loop, fed from a loop, runs behind the stage that feeds it, from
+// A stage with a loop, fed from a loop, runs after the stage that feeds it, from
 // a list of the bin, also where primitives come in strips; and runs inside it
 // where the order of what it emits would show, or where it only changes pixels.
 // REQUIRES: all
 // RUN: pikoc %s --pipe Chain --remarks --emit=kernels -o - 2>&1 | FileCheck %s --check-prefix=BEHIND
 // BEHIND: remark: stage 'shade' takes what stage 'spread' emits in a loop from a list, as its own loops fill vectors there
-// BEHIND: piko.schedule direct_map behind
+// BEHIND: piko.schedule direct_map after
 // BEHIND: piko.local_barrier @spread[0] -> @shade
 // BEHIND: piko.strips
 // RUN: pikoc %s --pipe Pixels --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=BEHIND-PIXELS
 // BEHIND-PIXELS: remark: stage 'shade' takes what stage 'cover' emits in a loop from a list
-// BEHIND-PIXELS: remark: stage 'shade' runs bin by bin behind stage 'cover'
+// BEHIND-PIXELS: remark: stage 'shade' runs bin by bin after stage 'cover'
 // RUN: pikoc %s --pipe Further,Merged,Whole --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=INSIDE
 // INSIDE-COUNT-3: remark: stage 'shade' runs inside stage 'spread'
 // INSIDE-NOT: remark: stage 'shade' runs inside stage 'spread'
@@ -161,7 +161,7 @@ struct Pixels : piko::Pipe<State> {
   }
 };
 
-// What waits is fed by the stage behind, from strip to strip.
+// What waits is fed by the stage after, from strip to strip.
 struct Last : Blend<8> {
   void schedule(piko::BinId) {
     endBin();
@@ -180,7 +180,7 @@ struct Waits : piko::Pipe<State> {
   }
 };
 
-// Only the stage behind changes pixels, in a strip for which memory may run out.
+// Only the stage after changes pixels, in a strip for which memory may run out.
 struct Many : piko::Stage<8, 8, 64, Particle, Splat> {
   void assignBin(const Particle &p) {
     assignToBoundingBox(p, {p.x - 2, p.y - 2}, {p.x + 2, p.y + 2});

@@ -29,8 +29,8 @@
 // FAILS: 2 threads, run 0: got: stage 'stage', bin 0: expected an index into 'lights' in [0, 300), but got 300
 //
 // RUN: pikoc %s --pipe Nearest,OneRecord,TwoWays,Kinds,Line,Bands,Loops,Splats --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
-// ONCE-COUNT-8: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel behind that of stage
-// ONCE-NOT: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel behind that of stage
+// ONCE-COUNT-8: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel after that of stage
+// ONCE-NOT: remark: what is written to '{{color|image|line}}' is computed once for each pixel, by a kernel after that of stage
 // RUN: pikoc %s --pipe Picture --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=READ
 // READ: remark: what is written to 'color' is computed also where it is overwritten
 // READ: note: the index of this read is not proved to be inside, and would not be tested where it is overwritten
@@ -225,7 +225,7 @@ struct SplatsStage : piko::Stage<0, 0, 64, Particle>, piko::Uses<State> {
 };
 struct Splats : Alone<SplatsStage> {};
 
-// Reads behind a buffer's end, of primitives that others hide.
+// Reads after a buffer's end, of primitives that others hide.
 struct FailsStage : Discs<> {
   void process(const Particle &p) {
     parallelForPixels(lo(p), hi(p), [&](glm::ivec2 at) {

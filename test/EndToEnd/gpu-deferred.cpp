@@ -111,9 +111,9 @@ struct BinnedBox : piko::Stage<16, 16, 64, Shape>, piko::Uses<State> {
   }
 };
 
-// It is seen behind the loop what that has done: not put off. So is what other
+// It is seen after the loop what that has done: not put off. So is what other
 // primitives have done, which breaks the rules of state, and has the reference's
-// order where the CPU plays the GPU alone.
+// order where the CPU emulates the GPU alone.
 struct See : piko::Stage<0, 0, 1, Shape>, piko::Uses<State> {
   void schedule(piko::BinId) { specifySchedule(piko::Serialize); }
   void process(const Shape &s) {

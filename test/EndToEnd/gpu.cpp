@@ -20,7 +20,7 @@
 // RUN: not piko-compare %s --pipe Stops --count 500 --runs 1 --target gpu-on-cpu --gpu-threads 64 --gpu-seed 5 | FileCheck %s --check-prefix=STOPS
 // RUN: env PIKO_CUDA_DRIVER=%test_driver PIKO_TEST_DRIVER_SEED=3 not piko-compare %s --pipe Stops --count 500 --runs 1 --target cuda --gpu-threads 32 | FileCheck %s --check-prefix=STOPS
 // STOPS-COUNT-3: got: stage 'draw', bin {{[0-9]+}}: expected an index into 'limits' in [0, 64), but got -2{{$}}
-// A pixel is behind a test, or loops step from one of a thread's own to the next.
+// A pixel is under a test, or loops step from one of a thread's own to the next.
 // RUN: pikoc %s --pipe Boxes --emit=gpu --gpu-threads 8 | FileCheck %s --check-prefix=GPU
 // GPU-LABEL: gpu.func @Boxes_kernel_draw
 // GPU-SAME:    workgroup({{.*}}memref<{{[0-9]+x[if][0-9]+}}, #gpu.address_space<workgroup>>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Elements of arrays in primitives, read behind conditions that keep the index
+// Elements of arrays in primitives, read under conditions that keep the index
 // inside: nothing reads one ahead of its condition.
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Conditions --count 2000

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// A read behind a test of its index stays there, also where the condition right
+// A read under a test of its index stays there, also where the condition right
 // around it is one that another read has.
 // RUN: %compare_targets %s --domain 1 1 --count 500 --runs 1 | FileCheck %s
 // CHECK: {{^equal}}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Indices that are tested in front of a loop, or not at all, are those of the
+// Indices that are tested before a loop, or not at all, are those of the
 // reference, at the ends of buffers and past them.
 // REQUIRES: all
 // RUN: %compare_targets %s --cases %s

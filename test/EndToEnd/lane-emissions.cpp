@@ -128,7 +128,7 @@ struct ManyFields : piko::Pipe<State> {
   }
 };
 
-/// With padding inside and behind, of which a byte by byte copy tells.
+/// With padding inside and after, of which a byte by byte copy tells.
 struct Gap {
   uint8_t kind;
   double value;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Loops that lanes share though they are written in order, short arrays of each
-// lane, remainders by what lanes share, and reads of records behind conditions.
+// lane, remainders by what lanes share, and reads of records under conditions.
 // REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
 // CASE: --pipe Neighbours --domain 40 40 --count 700
@@ -168,7 +168,7 @@ struct Bytes : piko::Pipe<State> {
   }
 };
 
-// Turns of which several store to one place: the last one counts.
+// Iterations of which several store to one place: the last one counts.
 struct Copy : piko::Stage<0, 0, 1, Prim>, piko::Uses<State> {
   void process(const Prim &p) {
     int n = int(state().results.size());
@@ -188,7 +188,7 @@ struct Copies : piko::Pipe<State> {
   }
 };
 
-// Steps of several turns would leave 64 bits.
+// Steps of several iterations would leave 64 bits.
 struct Ending : piko::Stage<0, 0, 64, Prim>, piko::Uses<State> {
   void process(const piko::List<Prim> &list) {
     for (int64_t i = INT64_MAX - 20; i < INT64_MAX - (list[0].x & 1); ++i) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Stages that wait for their bin, in the kernel of the stage that feeds them:
-// lists, batches, empty bins, primitives behind endBin, iterations that meet. A
+// lists, batches, empty bins, primitives after endBin, iterations that meet. A
 // stage further on gets what two of them, and the first one, emit, in lineage
 // order.
 // REQUIRES: all
 // RUN: pikoc %s --pipe Chain --emit=kernels --remarks -o %t.mlir 2>&1 | FileCheck %s --check-prefix=REMARK
 // RUN: FileCheck %s --check-prefix=KERNEL --input-file=%t.mlir
-// REMARK-DAG: local-barrier.cpp:[[#]]:{{[0-9]+}}: remark: stage 'sort' runs bin by bin behind stage 'spread'
-// REMARK-DAG: remark: stage 'pairs' runs bin by bin behind stage 'sort'
-// REMARK-DAG: remark: stage 'settle' runs bin by bin behind stage 'pairs'
+// REMARK-DAG: local-barrier.cpp:[[#]]:{{[0-9]+}}: remark: stage 'sort' runs bin by bin after stage 'spread'
+// REMARK-DAG: remark: stage 'pairs' runs bin by bin after stage 'sort'
+// REMARK-DAG: remark: stage 'settle' runs bin by bin after stage 'pairs'
 // KERNEL:      piko.process of @spread
 // KERNEL:      piko.assign of @sort port 0
 // KERNEL:      piko.assign of @join port 1
@@ -77,7 +77,7 @@ struct Spread : piko::Stage<size, size, 64, Point, Point, Point>,
 struct Sort : piko::Stage<size, size, 64, Point, Point, Point>,
               piko::Uses<State> {
   void assignBin(const Point &p) {
-    if (p.tag % 7 != 3) // may stay behind
+    if (p.tag % 7 != 3) // may stay after
       assignToPreviousBins(p);
   }
   void schedule(piko::BinId) { endBin(); }

@@ -241,7 +241,7 @@ struct Kind : Alone<> {
 };
 struct Kinds : Buffers<Kind> {};
 
-// Emissions behind the last barrier, of some.
+// Emissions after the last barrier, of some.
 struct Emitter : Alone<Particle, Particle> {
   void process(const Particle &p) {
     parallelFor(16, [&](int i) {
@@ -275,7 +275,7 @@ template <class S> struct Emitting : piko::Pipe<State> {
 };
 struct Emits : Emitting<Emitter> {};
 
-// In front of a barrier.
+// Before a barrier.
 struct EmitterBefore : Alone<Particle, Particle> {
   void process(const Particle &p) {
     parallelFor(16, [&](int i) {

@@ -59,7 +59,7 @@ struct Mask : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
           break;
         result.sum += values[first + i++];
       }
-      // A turn of the loop that a case of a switch ends.
+      // An iteration of the loop that a case of a switch ends.
       for (int k = 0; k < 6; ++k) {
         switch ((item.a >> k) & 3) {
         case 0:

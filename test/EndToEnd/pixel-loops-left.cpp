@@ -161,12 +161,12 @@ struct Meets : Loops<15> {
   }
 };
 
-// A counter that is seen behind its loop.
+// A counter that is seen after its loop.
 struct Behind : Loops<16> {
   void process(const Seed &s) {
     Box b = clipped(s);
     int x = b.lo.x, y = b.lo.y;
-    // STAYS: [[#@LINE + 2]]:5: remark: this loop over pixels of stage 'behind' stays
+    // STAYS: [[#@LINE + 2]]:5: remark: this loop over pixels of stage 'after' stays
     // STAYS: note: this value goes from one iteration to the next
     for (; y <= b.hi.y; ++y)
       for (x = b.lo.x; x <= b.hi.x; ++x)
@@ -202,7 +202,7 @@ struct Everything : piko::Pipe<State> {
   Arrays arrays;
   Spine spine;
   Meets meets;
-  Behind behind;
+  Behind after;
   Outside outside;
   Everything() {
     source(stores);
@@ -216,7 +216,7 @@ struct Everything : piko::Pipe<State> {
     source(arrays);
     source(spine);
     source(meets);
-    source(behind);
+    source(after);
     source(outside);
   }
 };

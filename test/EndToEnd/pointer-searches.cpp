@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Pointers that searches give, into an array behind another member and in front
-// of one, and pointers that walk through the arrays of several records.
+// Pointers that searches give, into an array after another member and before one, and pointers that walk through the arrays of several records.
 // REQUIRES: all
 // RUN: %compare_targets %s --count 64 | FileCheck %s
 // CHECK: equal

@@ -2,7 +2,7 @@
 //
 // Stages that need not be strict give the same bits on any number of threads,
 // in vectors, in their remainders and in scalar code, fused or not, and on a
-// GPU that the CPU plays; what is only contracted, also without an instruction
+// GPU emulated on the CPU; what is only contracted, also without an instruction
 // for it. They are near to the reference executor's, and the same where no other
 // number is near: of divisions by 0, of roots of infinity, of NaNs.
 // RUN: piko-compare %s --pipe Contracted --count 1003 --domain 9 9 --tolerance 1e-6 > %t.contracted

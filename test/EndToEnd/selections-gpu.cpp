@@ -21,7 +21,7 @@
 // CASE: --pipe TilesGoOn --count 900 --domain 67 35
 // CASE: --pipe TilesBlend --count 900 --domain 67 35
 // With a budget the frame is the host's, which clears what the kernels have for
-// themselves in front of each launch.
+// themselves before each launch.
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %S/selections.cpp --pipe Rounds --count 3000 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST
 // RUN: env PIKO_CUDA_DRIVER=%test_driver piko-compare %s --pipe Tiles --count 900 --domain 67 35 --runs 2 --threads 2 --target cuda --budget 50000000 | FileCheck %s --check-prefix=HOST
 // HOST: {{^equal$}}
@@ -210,7 +210,7 @@ struct DrawReading : Boxes {
 struct Reading : Pipe<DrawReading> {};
 
 //===----------------------------------------------------------------------===//
-// Behind a local edge, where the threads of a block share what has come
+// After a local edge, where the threads of a block share what has come
 //===----------------------------------------------------------------------===//
 
 /// Fragments of a box in a bin.

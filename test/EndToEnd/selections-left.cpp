@@ -250,7 +250,7 @@ struct DrawSecond : Boxes {
 };
 struct Second : Pipe<DrawSecond> {};
 // WHY-LABEL: pipe Second
-// WHY: note: a number behind the first of a key may be a NaN
+// WHY: note: a number after the first of a key may be a NaN
 
 struct DrawSometimes : Boxes {
   void process(const Point &p) {

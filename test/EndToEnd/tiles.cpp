@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The pixels of a bin in a tile: with partial bins at the edges of the domain and
-// bins in which nothing is, in strips, behind a wait for the bin, in a list that
+// bins in which nothing is, in strips, after a wait for the bin, in a list that
 // runs for every bin. What is in the images is the reference executor's, from run
 // to run.
 // REQUIRES: all
@@ -67,7 +67,7 @@ struct Items : piko::Pipe<State> {
   }
 };
 
-// Reads and stores pixels of the bin, behind all updates of it.
+// Reads and stores pixels of the bin, after all updates of it.
 template <bool Every>
 struct Mark : piko::Stage<16, 16, 64, Point>, piko::Uses<State> {
   void assignBin(const Point &p) { this->assignToPreviousBins(p); }

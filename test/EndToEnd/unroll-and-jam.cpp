@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Loops around loops that change the same elements in each of their turns, in
-// all styles: four turns share the inner loop where none sees it, and the others
+// all styles: four iterations share the inner loop where none sees it, and the others
 // keep their order.
 // REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1
@@ -23,15 +23,15 @@
 //
 // DEFINE: %{remarks} = pikoc %s --remarks --without vectorize -o /dev/null
 // RUN: %{remarks} --pipe Product,Whiles,Unsigneds,References,Taps,Doubles,Own,Blocks,Records 2>&1 | FileCheck %s --check-prefix=JAMMED
-// JAMMED-COUNT-10: remark: 4 turns of this loop share those of the loop inside of it (unroll-and-jam)
-// JAMMED-NOT: turns of this loop
+// JAMMED-COUNT-10: remark: 4 iterations of this loop share those of the loop inside of it (unroll-and-jam)
+// JAMMED-NOT: iterations of this loop
 // RUN: %{remarks} --pipe Solves,Meets 2>&1 | FileCheck %s --check-prefix=ORDER
-// ORDER: remark: turns of this loop do not share those of the loop inside of it (unroll-and-jam)
-// ORDER: note: it may use an element here that another turn of the inner loop changes
-// ORDER: remark: turns of this loop do not share those of the loop inside of it (unroll-and-jam)
-// ORDER: note: it may use an element here that another turn of the inner loop changes
+// ORDER: remark: iterations of this loop do not share those of the loop inside of it (unroll-and-jam)
+// ORDER: note: it may use an element here that another iteration of the inner loop changes
+// ORDER: remark: iterations of this loop do not share those of the loop inside of it (unroll-and-jam)
+// ORDER: note: it may use an element here that another iteration of the inner loop changes
 // RUN: %{remarks} --pipe Skewed,Sums 2>&1 | FileCheck %s --check-prefix=NONE --allow-empty
-// NONE-NOT: turns of this loop
+// NONE-NOT: iterations of this loop
 #include <piko.h>
 
 struct Row {
@@ -176,7 +176,7 @@ struct Record {
 };
 struct Records : Alone<Record> {};
 
-// Fewer turns than share a loop, none, and turns of the inner loop likewise.
+// Fewer iterations than share a loop, none, and iterations of the inner loop likewise.
 struct Short {
   static void run(State &state, int i) {
     int few = i % 3, none = int(state.a.size()) - 64;
@@ -203,7 +203,7 @@ struct Skew {
 };
 struct Skewed : Alone<Skew> {};
 
-// Each turn needs what the one before has made of another element.
+// Each iteration needs what the one before has made of another element.
 struct Solve {
   static void run(State &state, int) {
     for (int k = 0; k < 12; ++k)
@@ -213,7 +213,7 @@ struct Solve {
 };
 struct Solves : Alone<Solve> {};
 
-// One number for all turns of the inner loop.
+// One number for all iterations of the inner loop.
 struct Sum {
   static void run(State &state, int i) {
     for (int k = 0; k < 7; ++k) {
@@ -226,7 +226,7 @@ struct Sum {
 };
 struct Sums : Alone<Sum> {};
 
-// Turns of the inner loop that change the same element.
+// Iterations of the inner loop that change the same element.
 struct Meet {
   static void run(State &state, int) {
     for (int k = 0; k < 10; ++k)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The updates of a pixel run in lineage order, in a bin that threads share and
-// in small ones, behind a stage that sends a primitive through several bins.
+// in small ones, after a stage that sends a primitive through several bins.
 // RUN: %compare_targets %s --cases %s
 // CASE: --pipe Shared --count 20000
 // CASE: --pipe Shared --count 2000 --strip 7

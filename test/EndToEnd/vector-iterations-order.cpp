@@ -150,7 +150,7 @@ struct Neighbours : piko::Pipe<State> {
   Neighbours() { source(stage); }
 };
 
-// The same, in different turns of an inner loop.
+// The same, in different iterations of an inner loop.
 struct Shift : piko::Stage<32, 8, 64, Item>, piko::Uses<State> {
   void assignBin(const Item &p) {
     assignToBin(p, binFromPosition(wrap(p.x, p.y, domain())));

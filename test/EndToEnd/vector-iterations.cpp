@@ -33,7 +33,7 @@ struct Works : piko::Stage<16, 16, 64, Item>, piko::Uses<State> {
   }
 };
 
-// Loops that end after different numbers of turns, and in the middle.
+// Loops that end after different numbers of iterations, and in the middle.
 struct Escape {
   static void run(State &state, const Item &p, int i, int at) {
     float x = 0, y = 0, a = float(i) * 0.05f - 1.2f, b = p.value * 0.5f;

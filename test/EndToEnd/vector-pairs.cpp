@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops whose turns differ between primitives, and hand on nothing, fill vectors
-// with pairs of a primitive and a turn: of boxes that are empty, small and large,
+// Loops whose iterations differ between primitives, and hand on nothing, fill vectors
+// with pairs of a primitive and an iteration: of boxes that are empty, small and large,
 // in loops of several kinds, with numbers of several widths.
 // REQUIRES: all
 // RUN: %compare_targets %s --cases %s --runs 1 --threads 2
@@ -82,7 +82,7 @@ struct RowsStage : Base {
   }
 };
 
-// More turns than pairs are made of.
+// More iterations than pairs are made of.
 struct LongStage : Base {
   void process(const Box &b) {
     int turns = b.width % 3 == 0 ? 5000 + b.width % 100 : b.width % 5;
@@ -144,7 +144,7 @@ struct DownStage : Base {
   }
 };
 
-// A sum and a maximum of an element that one primitive has, turn after turn.
+// A sum and a maximum of an element that one primitive has, iteration after iteration.
 struct KindsStage : Base {
   void process(const Box &b) {
     glm::ivec4 box = boxOf(b, 9);

@@ -60,7 +60,7 @@ inline float workMore(float x, float y) {
   return x;
 }
 
-// How often an inner loop went around is used behind it.
+// How often an inner loop went around is used after it.
 struct Average : piko::Stage<0, 0, 64, Particle>, piko::Uses<State> {
   void process(const Particle &p) {
     float sum = 0;
@@ -91,7 +91,7 @@ struct Address : piko::Stage<0, 0, 64, Particle>, piko::Uses<State> {
 };
 using Addresses = Buffers<Address>;
 
-// What an inner loop with effects reads is read again behind it.
+// What an inner loop with effects reads is read again after it.
 struct Repeat : piko::Stage<0, 0, 64, Particle>, piko::Uses<State> {
   void process(const Particle &p) {
     int i = 0;
@@ -134,7 +134,7 @@ struct Reader : piko::Stage<0, 0, 64, Particle>, piko::Uses<State> {
 };
 using Outside = Buffers<Reader>;
 
-// Work behind a test that needs the primitive itself.
+// Work under a test that needs the primitive itself.
 struct Fragment {
   int x, y;
   float z, weights[4];

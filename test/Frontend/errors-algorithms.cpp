@@ -34,7 +34,7 @@ struct Sorter : piko::Stage<0, 0, 1, A, A> {
     // BYTES: errors-algorithms.cpp:[[#@LINE + 1]]:5: error: not supported in Piko: copying or filling a number of bytes that varies, of which it is not known that they are whole elements of one type; write a loop over the elements{{$}}
     std::memcpy(k, k + 3, a.x & 7);
 #elif CASE == 5
-    // Behind the first array there is another one.
+    // After the first array there is another one.
     struct Two {
       int first[4];
       float second[4];

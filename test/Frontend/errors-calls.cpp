@@ -2,7 +2,7 @@
 //
 // What a header does that Piko does not have is an error at the user's own
 // call, in the names that the user wrote. Notes show the calls that lead there,
-// and those behind it.
+// and those after it.
 // RUN: not piko-translate --cpp-to-piko -DCASE=1 %s 2>&1 | FileCheck %s --check-prefix=PUSH
 // RUN: not piko-translate --cpp-to-piko -DCASE=2 %s 2>&1 | FileCheck %s --check-prefix=LOOP
 // RUN: not piko-translate --cpp-to-piko -DCASE=3 %s 2>&1 | FileCheck %s --check-prefix=STATIC

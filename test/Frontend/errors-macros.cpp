@@ -9,14 +9,14 @@
 #ifdef BEFORE
 #define emit
 #endif
-// BEFORE: piko.h:{{.*}}error: {{.*}}a macro called 'emit' hides a function of Piko: with Qt, define QT_NO_KEYWORDS; else write '#undef emit' in front of this header
+// BEFORE: piko.h:{{.*}}error: {{.*}}a macro called 'emit' hides a function of Piko: with Qt, define QT_NO_KEYWORDS; else write '#undef emit' before this header
 #include <piko.h>
 #ifndef BEFORE
 // CHECK: :[[#@LINE+2]]:9: error: a macro called 'emit' hides a function of the language
-// CHECK: note: with Qt, define QT_NO_KEYWORDS; else write '#undef emit' in front of the pipeline
+// CHECK: note: with Qt, define QT_NO_KEYWORDS; else write '#undef emit' before the pipeline
 #define emit
 // CHECK: :[[#@LINE+2]]:9: error: a macro called 'source' hides a function of the language
-// CHECK: note: write '#undef source' in front of the pipeline
+// CHECK: note: write '#undef source' before the pipeline
 #define source(x)
 // Of names that are no functions, and of what nothing calls.
 #define slots

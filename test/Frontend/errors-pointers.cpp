@@ -22,7 +22,7 @@ struct A {
   int x, y;
   float z;
 };
-// The end of `c` may be the place of a base class behind it: both are a step
+// The end of `c` may be the place of a base class after it: both are a step
 // over bytes.
 struct Bytes {
   signed char c[4];

@@ -51,7 +51,7 @@ struct Derived : piko::Pipe<DerivedState> {
 };
 
 class Put : public piko::Stage<0, 0, 64, int> {
-  // PRIVATE: errors-state-arrays.cpp:[[#@LINE + 1]]:8: error: expected phase 'process' of stage 'put' to be public, because the executor calls it; write 'public:' in front of it
+  // PRIVATE: errors-state-arrays.cpp:[[#@LINE + 1]]:8: error: expected phase 'process' of stage 'put' to be public, because the executor calls it; write 'public:' before it
   void process(const int &) {}
 };
 struct Private : piko::Pipe<> {

@@ -15,7 +15,7 @@
 // RUN: pikoc %s --pipe Cases --emit=authored | FileCheck %s --check-prefix=CASES
 // CASES: piko.probabilities = array<f64: 0.33{{[0-9]*}}, 9.31{{[0-9]*}}E-10, 0.66{{[0-9]*}}>
 //
-// Of a loop it is how probable another turn is, by all that ends it; the inner one, of
+// Of a loop it is how probable another iteration is, by all that ends it; the inner one, of
 // which nothing is said, has none.
 // RUN: pikoc %s --pipe Loops --emit=machine | FileCheck %s --check-prefix=LOOPS
 // LOOPS: scf.while

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Pipelines in namespaces and classes: a name that is one's own needs nothing in
-// front of it, and where several have one, each is called by what it is in.
+// Pipelines in namespaces and classes: a name that is one's own needs nothing before it, and where several have one, each is called by what it is in.
 // RUN: pikoc %s --list-pipes | FileCheck %s --check-prefix=LIST
 // LIST: {{^}}near::P{{$}}
 // LIST-NEXT: {{^}}Only{{$}}

@@ -3,7 +3,7 @@
 // A position may be a vector or a braced list of numbers: floats are a
 // position, integers are cells, and the reference agrees.
 // RUN: piko-translate --cpp-to-piko %s | FileCheck %s
-// RUN: %cxx_behind_header -fsyntax-only %s
+// RUN: %cxx_after_header -fsyntax-only %s
 #include <piko.h>
 
 struct Item {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // C++ leaves open in which order arguments are evaluated. Where that shows, the
-// compiler says so, also behind calls, references, pointers and captures.
+// compiler says so, also after calls, references, pointers and captures.
 // RUN: piko-translate --cpp-to-piko %s 2>&1 | FileCheck %s --implicit-check-not=warning:
 #include <piko.h>
 

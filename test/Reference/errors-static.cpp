@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What the C++ compiler refuses, in words of the language.
-// RUN: %cxx_behind_header -DCASE=0 -fsyntax-only %s
-// RUN: not %cxx_behind_header -DCASE=1 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=INT
-// RUN: not %cxx_behind_header -DCASE=2 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
-// RUN: not %cxx_behind_header -DCASE=3 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=MUTABLE
-// RUN: not %cxx_behind_header -DCASE=4 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
-// RUN: not %cxx_behind_header -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
-// RUN: not %cxx_behind_header -DCASE=6 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
-// RUN: not %cxx_behind_header -DCASE=7 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
-// RUN: not %cxx_behind_header -DCASE=8 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=PROCESS
-// RUN: not %cxx_behind_header -DCASE=9 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
-// RUN: not %cxx_behind_header -DCASE=10 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=BIN
-// RUN: not %cxx_behind_header -DCASE=11 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
+// RUN: %cxx_after_header -DCASE=0 -fsyntax-only %s
+// RUN: not %cxx_after_header -DCASE=1 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=INT
+// RUN: not %cxx_after_header -DCASE=2 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=ASSIGN
+// RUN: not %cxx_after_header -DCASE=3 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=MUTABLE
+// RUN: not %cxx_after_header -DCASE=4 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+// RUN: not %cxx_after_header -DCASE=5 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=CONST
+// RUN: not %cxx_after_header -DCASE=6 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not %cxx_after_header -DCASE=7 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=COPY
+// RUN: not %cxx_after_header -DCASE=8 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=PROCESS
+// RUN: not %cxx_after_header -DCASE=9 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
+// RUN: not %cxx_after_header -DCASE=10 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=BIN
+// RUN: not %cxx_after_header -DCASE=11 -fsyntax-only %s 2>&1 | FileCheck %s --check-prefix=SCHEDULE
 // RUN: not pikoc -DCASE=6 --pipe TakePipe %s -o %t.o 2>&1 | FileCheck %s --check-prefix=COPY
 #include <piko.h>
 

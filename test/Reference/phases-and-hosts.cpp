@@ -3,7 +3,7 @@
 // What pikoc refuses the reference does not accept: buffers that a phase needs
 // and nobody has bound, and the host's calls in a phase. A buffer that no phase
 // uses need not be bound.
-// RUN: %cxx_behind_header %s -o %t && %t | FileCheck %s
+// RUN: %cxx_after_header %s -o %t && %t | FileCheck %s
 #include <piko.h>
 
 #include <cstdio>

@@ -11,7 +11,7 @@
 // RUN: piko-opt --split-input-file %t.both | FileCheck %s --check-prefix=BOTH
 // RUN: not pikoc %s --pipe Small,None -o %t.ll 2>&1 | FileCheck %s --check-prefix=UNKNOWN
 // RUN: not pikoc %s --pipe Small,Large -o %t.o 2>&1 | FileCheck %s --check-prefix=ONE
-// What is written of several is a text, one behind the other.
+// What is written of several is a text, one after the other.
 
 #include <piko.h>
 

@@ -86,7 +86,7 @@ struct Unseen : piko::Stage<0, 0, 64, Item> {
 
 // CHECK-NEXT: {{^  }}last: one bin, 64 threads, all in tiles of 64 primitives, unordered
 // CHECK-NEXT: from source 1: 16 bytes a primitive
-// CHECK-NEXT: waits for the end of stage first: a kernel break behind kernel_first
+// CHECK-NEXT: waits for the end of stage first: a kernel break after kernel_first
 struct Last : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   void schedule(piko::BinId) {
     specifySchedule(piko::All, 64);

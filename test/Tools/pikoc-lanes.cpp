@@ -38,7 +38,7 @@ struct Forced : piko::Stage<0, 0, 64, Box, Box> {
   }
 };
 
-// It would be vectorized, and becomes no part of the stage in front of it.
+// It would be vectorized, and becomes no part of the stage before it.
 // MACHINE-DAG: piko.items of @alone lanes one {
 // FINE-DAG: the lanes of stage 'alone' are specified
 struct Alone : piko::Stage<0, 0, 64, Box, Box> {

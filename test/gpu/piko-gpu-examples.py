@@ -5,8 +5,8 @@
   piko-gpu-examples.py --bin build/bin --driver build/lib/libpiko-test-driver.so
   piko-gpu-examples.py --bin build/bin --only raster --jobs 1
 
-Each runs on one that the CPU plays, in blocks of 32 threads, and as PTX on a CUDA
-device, in blocks of 64: behind NVIDIA's driver, or the one that is given, such as
+Each runs on one emulated on the CPU, in blocks of 32 threads, and as PTX on a CUDA
+device, in blocks of 64: on NVIDIA's driver, or the one that is given, such as
 the driver for tests, with two orders of blocks. Pictures must
 equal, bit for bit, those of the CPU, which other tests hold to the reference
 executor; what draws no picture is compared with the reference executor on random

@@ -32,7 +32,7 @@ class Link:
 
 class Chains(Statements):
     def add_chain(self, pipe):
-        """Behind a stage that there is, or a new one with a source."""
+        """After a stage that there is, or a new one with a source."""
         r = self.random
         self.use("chains")
         self.function_seed = r.random()

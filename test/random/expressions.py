@@ -24,7 +24,7 @@ COMPARISONS = ["<", "<=", ">", ">=", "==", "!="]
 
 class Scope:
     """The names that an expression or statement may use. A scope inside
-    another sees its names; what is in front of a parallelFor (`level`) may be
+    another sees its names; what is before a parallelFor (`level`) may be
     read in it, but not assigned."""
 
     def __init__(self, maker, phase, outer=None, **changes):
@@ -86,7 +86,7 @@ class Expressions:
             self.use("shifts")
         if name in ("/", "%"):
             self.use("integer-division")
-            if r.random() < 0.4:  # divides behind a test of the divisor
+            if r.random() < 0.4:  # divides under a test of the divisor
                 return Op(kind, "divif", [operands[0], self.leaf(kind, scope)])
         if name in "+-*" and kind in ("i32", "i64"):
             self.use("wrapping")

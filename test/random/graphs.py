@@ -105,7 +105,7 @@ class Graphs(Chains):
         r.shuffle(pipe.edges)
 
     def add_many_edges(self, pipe):
-        """More than are merged at a time, from any stages to one behind them."""
+        """More than are merged at a time, from any stages to one after them."""
         r = self.random
         self.use("many-inputs")
         to = r.randrange(1, len(pipe.stages))

@@ -21,7 +21,7 @@ class Phases(Graphs):
         choices = [j for j in range(len(pipe.stages))
                    if j != index and j not in self.reachable(pipe, index, self.waits)
                    and index in range(len(pipe.stages))]
-        # Nobody waits for a stage of its own cycle, or for one behind it.
+        # Nobody waits for a stage of its own cycle, or for one after it.
         if choices and self.on("endStage") and r.random() < (0.045 if inside else 0.3):
             for target in r.sample(choices, min(len(choices), r.choice([1, 1, 2]))):
                 self.waits.append((target, index))

@@ -12,7 +12,7 @@ failure can then be shown, or reduced to a short file. Features are left out wit
 `--without lists,sync`, or named with `--features`; `--leave-out fuse-stages` leaves
 passes of the compiler out. With `--mlir` each pipeline is
 written in the dialect, too, and that is compiled in place of the C++. With
-`--gpu` kernels run as blocks and threads on a GPU that the CPU plays; their number
+`--gpu` kernels run as blocks and threads on a GPU emulated on the CPU; their number
 and the order of blocks follow from the seed.
 """
 
@@ -157,8 +157,8 @@ def main():
                         help="compile the text of the dialect, not C++")
     parser.add_argument("--gpu", nargs="?", const="gpu-on-cpu",
                         choices=["gpu-on-cpu", "cuda", "any"],
-                        help="run kernels on a GPU that the CPU plays, or on one "
-                             "behind $PIKO_CUDA_DRIVER")
+                        help="run kernels on a GPU emulated on the CPU, or on one "
+                             "after $PIKO_CUDA_DRIVER")
     parser.add_argument("--cpu", default="",
                         help="the processor to compile for (this machine's)")
     parser.add_argument("--strip", type=int, default=0,

@@ -28,7 +28,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
 
 
 def options_of(passes):
-    # What is ours behind the dialect works on vectors.
+    # What is ours after the dialect works on vectors.
     level = ["-O0"] if "vectorize" in passes else []
     return ["--without", ",".join(passes), *level] if passes else []
 
@@ -107,7 +107,7 @@ class Runner:
             if self.text:
                 write(file.with_suffix(".mlir"), dialect.write_file(pipes))
             verdicts = self.compare(file, pipes)
-            # A crash ends the process, and the pipelines behind it wait.
+            # A crash ends the process, and the pipelines after it wait.
             while len(verdicts) < len(pipes):
                 verdicts += self.compare(file, pipes[len(verdicts):])
             return verdicts

@@ -354,7 +354,7 @@ class Statements(Expressions):
     # --- parallelFor -----------------------------------------------------------
 
     def make_parallel(self, scope, nested=False):
-        """A parallelFor in front of which nothing is assigned in it."""
+        """A parallelFor before which nothing is assigned in it."""
         r = self.random
         self.use("parallel-in-list" if scope.has_size else "parallel-in-one")
         if nested:
@@ -398,7 +398,7 @@ class Statements(Expressions):
 
     def exchange(self, var, bound, over_list, outer, inner, arrays):
         """Iterations hand a value to others through a shared array: each writes
-        its own element and, behind a barrier, reads any."""
+        its own element and, after a barrier, reads any."""
         self.use("sync")
         self.use("shared-arrays")
         r = self.random

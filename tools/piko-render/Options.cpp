@@ -24,7 +24,7 @@ library of pikoc's objects, each of which runs on what it was made for.
   --pipe NAME            which pipeline of the file (the only one)
   --target cpu|cuda|auto|gpu-on-cpu|reference
                          compiled for this machine; for an NVIDIA GPU; for that
-                         where there is one; for a GPU that this machine plays;
+                         where there is one; for a GPU that this machine emulates;
                          or run by the reference executor (cpu)
   --cpu NAME             the processor to compile for, as clang names them, of
                          which this machine has everything (native)

@@ -91,18 +91,18 @@ void WasteFinder::addCalls(const StageWork &stage) {
   if (least > 0 && primitives > 1.5 * least)
     add(timeOf(stage) * (1 - needed / calls),
         stage.name + " takes " + text(primitives / least) +
-            " primitives for each element that it or a stage behind it writes",
+            " primitives for each element that it or a stage after it writes",
         !fillsPixels(stage)
             ? "shade what is visible alone: let an update keep the nearest, "
               "and "
-              "shade pixels behind it (endBin or endStage), or test depth "
+              "shade pixels after it (endBin or endStage), or test depth "
               "before the stage"
             : "leave out primitives earlier (culling), or take a coarser level "
               "of detail");
 }
 
 void WasteFinder::addTurns(const LoopWork &loop) {
-  double looked = double(loop.turns), used = double(loop.effects);
+  double looked = double(loop.iterations), used = double(loop.effects);
   if (used == 0 || looked <= 1.5 * used)
     return;
   for (const StageWork &stage : work.stages)

@@ -87,7 +87,7 @@ void Collector::add(int32_t index, const pikort_counter &counter) {
     of.integers += counter.count;
     return;
   case PIKORT_ITERATIONS:
-  case PIKORT_TURNS:
+  case PIKORT_TRIPS:
     work.loops.push_back({counter.stage, counter.place ? counter.place : "",
                           counter.kind == PIKORT_ITERATIONS, counter.count,
                           countOf(counter.around), 0});
@@ -143,18 +143,18 @@ static Result<Done> countFrame(Options options, SceneInput &scene,
   return Collector(work, frame->pipeline()).collect();
 }
 
-/// How many elements of state a stage and those behind it write.
+/// How many elements of state a stage and those after it write.
 static int64_t countWritten(const Work &work, const std::string &stage) {
-  std::set<std::string> behind = {stage};
+  std::set<std::string> after = {stage};
   for (bool grows = true; grows;) {
     grows = false;
     for (const EdgeWork &edge : work.edges)
-      if (behind.contains(edge.from))
-        grows |= behind.insert(edge.to).second;
+      if (after.contains(edge.from))
+        grows |= after.insert(edge.to).second;
   }
   std::map<std::string, int64_t> written; // of a piece of state
   for (const AccessWork &access : work.accesses)
-    if (access.kind != PIKORT_READS && behind.contains(access.stage)) {
+    if (access.kind != PIKORT_READS && after.contains(access.stage)) {
       int64_t &most = written[access.state];
       most = std::max(most, access.distinct);
     }

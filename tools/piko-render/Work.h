@@ -21,7 +21,7 @@ struct StageWork {
   int64_t calls = 0, floats = 0, integers = 0;
   int64_t updates = 0, emissions = 0;
   int64_t primitives = 0; ///< That came in; calls are for each of their bins.
-  /// Elements of state that the stage or those behind it write, each once:
+  /// Elements of state that the stage or those after it write, each once:
   /// pixels of the picture, or entries of a buffer. No more calls than these
   /// are needed; at most `calls`.
   int64_t least = 0;
@@ -47,8 +47,8 @@ struct AccessWork {
 struct LoopWork {
   std::string stage, place;
   bool isParallel = false;
-  int64_t turns = 0;
-  int64_t around = 0; ///< Turns of the loop around, or calls of the stage.
+  int64_t iterations = 0;
+  int64_t around = 0; ///< Iterations of the loop around, or calls of the stage.
   /// Emissions, updates and atomics whose innermost loop it is.
   int64_t effects = 0;
 };

@@ -71,7 +71,7 @@ static JsonObject reportLoop(const LoopWork &loop) {
       .add("stage", loop.stage)
       .add("place", loop.place)
       .add("parallel", int(loop.isParallel))
-      .add("turns", loop.turns)
+      .add("iterations", loop.iterations)
       .add("around", loop.around)
       .add("effects", loop.effects);
 }
@@ -120,7 +120,7 @@ print(std::string &to, const char *format, ...) {
   to += '\n';
 }
 
-/// With a unit of 1000s behind it where it is large.
+/// With a unit of 1000s after it where it is large.
 static std::string shorten(int64_t number) {
   char text[32];
   double value = double(number);
@@ -149,14 +149,14 @@ static void printStages(std::string &text, const Work &work, int64_t pixels) {
 static void printLoops(std::string &text, const Work &work) {
   if (work.loops.empty())
     return;
-  print(text, "  %-22s %10s %10s %10s  %s", "loops of", "turns", "each time",
-        "effects", "at");
+  print(text, "  %-22s %10s %10s %10s  %s", "loops of", "iterations",
+        "each time", "effects", "at");
   for (const LoopWork &loop : work.loops)
-    if (loop.turns)
+    if (loop.iterations)
       print(text, "  %-22s %10s %10.4g %10s  %s%s", loop.stage.c_str(),
-            shorten(loop.turns).c_str(), ratio(loop.turns, loop.around),
-            shorten(loop.effects).c_str(), loop.place.c_str(),
-            loop.isParallel ? ", parallel" : "");
+            shorten(loop.iterations).c_str(),
+            ratio(loop.iterations, loop.around), shorten(loop.effects).c_str(),
+            loop.place.c_str(), loop.isParallel ? ", parallel" : "");
 }
 
 static void printEdges(std::string &text, const Work &work) {

@@ -112,7 +112,7 @@ void Search::race(std::vector<Trial *> &pool, int rounds) {
     ++round;
     double time = 0;
     for (size_t j = 0; j < pool.size(); ++j) {
-      // To and fro, so that nobody is always the one behind the slowest.
+      // To and fro, so that nobody is always the one after the slowest.
       Trial *trial = pool[i % 2 ? pool.size() - 1 - j : j];
       if (visit(trial, &time))
         logs[trial->number].push_back(std::log(time));

@@ -53,7 +53,7 @@ struct CommandLine {
   llvm::cl::opt<std::string> pipe{
       "pipe", llvm::cl::value_desc("name,..."),
       llvm::cl::desc("the pipeline to compile, where a file has several; of "
-                     "several what is written stands one behind the other"),
+                     "several what is written stands one after the other"),
       llvm::cl::cat(category)};
   llvm::cl::opt<Emit> emit{
       "emit",

@@ -100,7 +100,7 @@ Outcome runNumbers(const LoadedProgram &program, int threads = 4) {
   return run;
 }
 
-/// `behind` makes a text of its own of it, which is in no cache.
+/// `after` makes a text of its own of it, which is in no cache.
 std::unique_ptr<LoadedProgram> load(const LoadOptions &options,
                                     std::string &diagnostics,
                                     const std::string &behind = "") {

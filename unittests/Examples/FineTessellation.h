@@ -81,7 +81,7 @@ private:
     return sum;
   }
 
-  /// Draws what is in front of the near plane of a triangle that is wholly
+  /// Draws what is before the near plane of a triangle that is wholly
   /// before the eye.
   void draw(glm::dvec4 a, glm::dvec4 b, glm::dvec4 c) {
     if (std::min({a.w, b.w, c.w}) <= 0)

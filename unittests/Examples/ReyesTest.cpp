@@ -300,7 +300,7 @@ TEST_F(ReyesTest, SmoothNormalsFaceTheEye) {
 }
 
 TEST_F(ReyesTest, ShadesTheNearest) {
-  // A square before another, and one behind both.
+  // A square before another, and one after both.
   for (float z : {0.0f, 1.0f, -1.0f})
     patches.push_back(patchOf([z](float u, float v) {
       return glm::vec3(u - 0.5f, v - 0.5f, z) * (z == 1 ? 0.5f : 1.0f);
@@ -374,7 +374,7 @@ Patch makeGround(float reach) {
   });
 }
 
-// From before the eye to far behind it; the lower half of the picture is full.
+// From before the eye to far after it; the lower half of the picture is full.
 TEST_F(ReyesTest, PatchesThroughTheEyePlane) {
   for (float reach : {3.0f, 100.0f, 1e4f}) {
     patches = {makeGround(reach)};

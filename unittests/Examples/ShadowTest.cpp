@@ -154,13 +154,13 @@ TEST_F(ShadowOnFloor, LiesWhereTheLightIsHidden) {
 TEST_F(ShadowOnFloor, BeginsAtTheFoot) {
   addQuad(input, {1, 1, -6}, {0, 0, 3}, {0, 2, 0});
   expectShadow([&](glm::vec3 point, float margin) {
-    float behind = 1 - point.x; // away from the light
-    float z = point.z + toLight.z / toLight.x * behind;
+    float after = 1 - point.x; // away from the light
+    float z = point.z + toLight.z / toLight.x * after;
     float beyond = std::abs(z + 6) - 3;
-    if (behind < -0.01f)
+    if (after < -0.01f)
       return point.x > 1 + margin ? -1 : 0;
-    float rise = behind * toLight.y / toLight.x; // of the light that passes
-    if (beyond < -margin && behind > 0.6f * margin && rise < 4 - margin)
+    float rise = after * toLight.y / toLight.x; // of the light that passes
+    if (beyond < -margin && after > 0.6f * margin && rise < 4 - margin)
       return 1;
     return beyond > margin || rise > 4 + margin ? -1 : 0;
   });

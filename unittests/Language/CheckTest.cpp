@@ -262,7 +262,7 @@ TEST_F(Check, UpdatesOfTwoStages) {
   EXPECT_EQ(reportOfChain(), nothing);
 }
 
-/// What is behind a stage that waits has waited, too, if nothing else feeds it.
+/// What is after a stage that waits has waited, too, if nothing else feeds it.
 struct Behind : Whole<Point, Point>, piko::Uses<Memory> {
   void process(const Point &p) {
     if (state().data[p.value] == 1)
@@ -272,7 +272,7 @@ struct Behind : Whole<Point, Point>, piko::Uses<Memory> {
 template <bool HasShortcut> struct BehindPipe : piko::Pipe<Memory> {
   First first;
   Second second;
-  Behind behind;
+  Behind after;
   End end, other;
   BehindPipe() {
     setDomain({8, 8});
@@ -280,10 +280,10 @@ template <bool HasShortcut> struct BehindPipe : piko::Pipe<Memory> {
     source(first);
     source(second);
     if (HasShortcut)
-      source(behind);
+      source(after);
     connect(first, 0, other);
-    connect(second, 0, behind);
-    connect(behind, 0, end);
+    connect(second, 0, after);
+    connect(after, 0, end);
   }
 };
 

@@ -52,7 +52,7 @@ TEST(Picture, ShadesByTheFormula) {
   addSquare(input, {0, 0}, 4, 2, glm::normalize(glm::vec3(0.3f, 0.2f, 1)));
   input.lights = {{{0.48f, 0.6f, 0.64f, 0}, {0.5f, 0.4f, 0.3f, 0}},
                   {{1, 1, -1, 1}, {0.1f, 0.2f, 0.3f, 0}},
-                  {{0, 0, -9, 1}, {9, 9, 9, 0}}}; // behind the square
+                  {{0, 0, -9, 1}, {9, 9, 9, 0}}}; // after the square
   const int side = 16;
   auto pixels = render<Baseline>(input, side, side);
   for (int y = 0; y < side; ++y)

@@ -188,7 +188,7 @@ TEST(Hit, NoLeakInAPotato) {
 
 // The box of a triangle lets all rays through that meet the triangle, also
 // those at its edges where these are the box's, from afar and from close by,
-// where the triangle reaches behind the origin.
+// where the triangle reaches after the origin.
 TEST(Hit, BoxesLetHitsThrough) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> d(-1, 1);

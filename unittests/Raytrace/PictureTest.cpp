@@ -75,7 +75,7 @@ TEST(Raytracer, ShadesByTheFormula) {
   addRectangle(input.mesh, {0, 0, -2}, {4, 0, 0}, {0, 4, 0}, n);
   input.lights = {{{0.48f, 0.6f, 0.64f, 0}, {0.5f, 0.4f, 0.3f, 0}},
                   {{1, 1, -1, 1}, {0.1f, 0.2f, 0.3f, 0}},
-                  {{0, 0, -9, 1}, {9, 9, 9, 0}}}; // behind the rectangle
+                  {{0, 0, -9, 1}, {9, 9, 9, 0}}}; // after the rectangle
   // Nothing is in the way, and partial bins are at the edges.
   for (bool shadows : {false, true}) {
     input.shadows = shadows;
@@ -90,7 +90,7 @@ TEST(Raytracer, ShadesByTheFormula) {
   }
 }
 
-// A small square in the air, its shadow on the ground behind it, of a light far
+// A small square in the air, its shadow on the ground after it, of a light far
 // away and of one that is near.
 TEST(Raytracer, Shadows) {
   Input input;
@@ -109,7 +109,7 @@ TEST(Raytracer, Shadows) {
       expectColor(image[16 * side + x], shade(p, {0, 0, 1}, input.lights));
     }
   }
-  // A light in front of the square throws none.
+  // A light before the square throws none.
   input.lights = {{{0, 1.5f, -6, 1}, glm::vec4(1)}};
   auto image = render(input, side, side);
   EXPECT_GT(image[16 * side + 16].rgba.g, 0.5f);

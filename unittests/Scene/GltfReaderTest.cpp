@@ -82,7 +82,7 @@ TEST(GltfReader, Primitives) {
   EXPECT_EQ(read({.primitive = R"("attributes":{"POSITION":0},"mode":1)"}),
             "it holds no triangles");
   EXPECT_EQ(read({.primitive = R"("attributes":{"POSITION":0})"}),
-            "1 of 50%; meshes[0].primitives[0] has 1 vertices behind its last "
+            "1 of 50%; meshes[0].primitives[0] has 1 vertices after its last "
             "triangle");
   EXPECT_EQ(read({.primitive = R"("attributes":{"POSITION":0},"mode":9)"}),
             "meshes[0].primitives[0] has the unknown mode 9");

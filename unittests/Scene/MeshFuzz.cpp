@@ -300,7 +300,7 @@ private:
 };
 
 Result<Mesh> readAs(Format format, const std::string &content) {
-  // On the heap and as long as it is, so that no read behind it goes unseen.
+  // On the heap and as long as it is, so that no read after it goes unseen.
   std::vector<char> copy(content.begin(), content.end());
   std::string_view view(copy.data(), copy.size());
   switch (format) {

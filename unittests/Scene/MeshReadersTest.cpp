@@ -141,7 +141,7 @@ TEST(PlyReader, FacesAndStrips) {
             "expected the length of a list, but got -3, at 'face' 1");
   EXPECT_EQ(read(ply(faces, "3 0 1 2\n3 0 1")), "it is cut short, at 'face' 1");
   EXPECT_EQ(read(ply(faces, "3 0 1 2\n3 0 1 2\n7 7")),
-            "2 of 100%; 2 bytes behind its last element are ignored");
+            "2 of 100%; 2 bytes after its last element are ignored");
   EXPECT_EQ(read(ply("element face 4000000000\n" + faceList, "3 0 1 2")),
             "it is cut short: it has no room for 4000000000 of its element "
             "'face'");
@@ -219,7 +219,7 @@ TEST(StlReader, TextAndBinary) {
   binary += std::string(2, '\0');
   EXPECT_EQ(read(binary), "1 of 100%");
   EXPECT_EQ(read(binary + "xy"),
-            "1 of 100%; 2 bytes behind its last triangle are ignored");
+            "1 of 100%; 2 bytes after its last triangle are ignored");
   EXPECT_EQ(read(binary.substr(0, 130)),
             "it is cut short: it has room for 0 of its 1 triangles");
 }

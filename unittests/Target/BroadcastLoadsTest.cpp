@@ -15,7 +15,7 @@ namespace {
 class BroadcastLoads : public PassTest {
 protected:
   /// Runs the pass on the body of a function of a pointer, a flag, a vector and
-  /// another pointer, and says whether a load is right in front of the splat's
+  /// another pointer, and says whether a load is right before the splat's
   /// insertion, as selection needs it.
   bool isRepeated(StringRef body) {
     std::string text =

@@ -35,7 +35,7 @@ protected:
     machine.reset(target->createTargetMachine(triple, "x86-64-v4", "", {}, {}));
   }
 
-  /// The first function of a text, behind the pass; null where the text is
+  /// The first function of a text, after the pass; null where the text is
   /// wrong.
   template <class Pass> llvm::Function *run(llvm::StringRef text) {
     llvm::SMDiagnostic error;

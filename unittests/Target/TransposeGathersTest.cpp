@@ -20,7 +20,7 @@ protected:
   };
 
   /// What is left of gathers of 8 lanes from records of 64 bytes, whose offsets
-  /// these are, all but the first one behind some other text.
+  /// these are, all but the first one after some other text.
   Counts count(ArrayRef<int> offsets, StringRef between = "",
                StringRef mask = "splat (i1 true)") {
     std::string text = "define <8 x float> @f(ptr %p, <8 x i64> %at, "

@@ -71,7 +71,7 @@ def parse_arguments():
     parser.add_argument("--seconds", default=480, type=float,
                         help="for all steps (480)")
     parser.add_argument("--from", dest="first", choices=STEPS, default=STEPS[0],
-                        metavar="STEP", help="leave out what is in front of it")
+                        metavar="STEP", help="leave out what is before it")
     parser.add_argument("--only", choices=STEPS, metavar="STEP", help="nothing else")
     parser.add_argument("--jobs", default=4, type=int,
                         help="processes at a time where nothing is timed (4)")

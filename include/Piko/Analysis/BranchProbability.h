@@ -19,11 +19,11 @@ std::optional<double> getProbability(mlir::scf::IndexSwitchOp choice,
 /// The same of a branch that goes to its first block.
 std::optional<double> getProbability(mlir::cf::CondBranchOp branch);
 
-/// How probable it is that a loop goes on for another turn.
-std::optional<double> getTurnProbability(mlir::Operation *loop);
-/// How often a loop turns that goes on as probably as the text says, each time
-/// alike: a geometric distribution.
-std::optional<double> getProbableTurns(mlir::Operation *loop);
+/// How probable it is that a loop goes on for another iteration.
+std::optional<double> getIterationProbability(mlir::Operation *loop);
+/// How often a loop iterates that goes on as probably as the text says, each
+/// time alike: a geometric distribution.
+std::optional<double> getProbableIterations(mlir::Operation *loop);
 
 /// Sets how probable it is that an scf.if takes its first side, or that a loop
 /// goes on; forgets it where that is not known.
@@ -32,8 +32,8 @@ void setProbability(mlir::Operation *op, std::optional<double> probability);
 /// How probable it is that the blocks of a loop's body, from the first one,
 /// come to the last one with a 1 for `again`, which is an argument of that.
 /// Nothing where a branch decides it of which nothing is said.
-std::optional<double> computeTurnProbability(mlir::Block *first,
-                                             mlir::BlockArgument again);
+std::optional<double> computeIterationProbability(mlir::Block *first,
+                                                  mlir::BlockArgument again);
 
 /// Keeps what is known of a branch or a loop that a pattern writes anew. It has
 /// no state: all rewriters may share it.

@@ -25,9 +25,9 @@ namespace piko {
 /// The most cells that a domain may have in a dimension: PIKORT_MAX_EXTENT.
 inline constexpr int64_t maxDomainExtent = int64_t(1) << 30;
 
-/// How an argument of a loop changes from turn to turn.
+/// How an argument of a loop changes from iteration to iteration.
 struct Recurrence {
-  /// What each turn adds, if that is always the same.
+  /// What each iteration adds, if that is always the same.
   std::optional<int64_t> step;
   bool rises = false, falls = false; ///< if not, it may do either
   /// What stands still while the loop runs, and is never passed.
@@ -91,7 +91,7 @@ public:
   std::pair<Linear, Linear> getBin(int64_t dim);
 
 private:
-  struct Frame {
+  struct Scope {
     mlir::Value primitive;    ///< null for the phase of the place itself
     mlir::Value same;         ///< the primitive that it is there
     EmissionOpInterface emit; ///< or the emission of it
@@ -133,8 +133,8 @@ private:
   /// where it is chosen.
   Linear chooseBetween(mlir::Value condition, mlir::Value ifTrue,
                        mlir::Value ifFalse, unsigned frame, Id id);
-  /// Expands what a value that an arm of a branch gives is computed from in
-  /// front of the branch: what holds of that holds whichever arm runs.
+  /// Expands what a value that an arm of a branch gives is computed from before
+  /// the branch: what holds of that holds whichever arm runs.
   void expandAhead(mlir::scf::IfOp branch, mlir::Value value, unsigned frame);
   Linear expandField(GetOp get, unsigned frame, Id id);
   Linear expandFloatCast(mlir::Operation *op, unsigned frame, Id id);
@@ -211,7 +211,7 @@ private:
   LinearSystem system;
   /// Where facts go: all hold, or those of an arm that is looked at.
   LinearFact *facts;
-  llvm::SmallVector<Frame> frames{1};
+  llvm::SmallVector<Scope> frames{1};
   llvm::SmallVector<mlir::Value> items;
   llvm::SmallVector<std::pair<mlir::Value, unsigned>> values; // by id
   llvm::DenseMap<std::pair<mlir::Value, unsigned>, Id> ids;

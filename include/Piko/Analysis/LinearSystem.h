@@ -76,7 +76,7 @@ public:
 private:
   struct Search;
 
-  /// How many numbers the matrices of all questions may have; behind that
+  /// How many numbers the matrices of all questions may have; after that
   /// nothing is found out.
   static constexpr int64_t maxWork = 2'000'000;
 

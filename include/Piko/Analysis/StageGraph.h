@@ -54,7 +54,7 @@ struct NodeGraph {
 
   explicit NodeGraph(const StageGraph &graph);
 
-  /// Nodes so that each comes behind what it depends on, and otherwise as
+  /// Nodes so that each comes after what it depends on, and otherwise as
   /// declared; fewer than all where nodes wait for each other.
   llvm::SmallVector<int> declarationOrder() const;
 };

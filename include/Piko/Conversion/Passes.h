@@ -15,7 +15,7 @@
 
 namespace piko {
 
-/// Updates and other access to state, behind tests, as `scf.if`s.
+/// Updates and other access to state, under tests, as `scf.if`s.
 void populatePikoToSCFPatterns(mlir::RewritePatternSet &patterns);
 
 /// The `scf.forall` of a kernel, over OpenMP threads.

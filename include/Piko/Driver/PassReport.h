@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What passes change, seen from outside: by the operations that are there
-// before and behind them. No pass counts for itself.
+// before and after them. No pass counts for itself.
 
 #ifndef PIKO_DRIVER_PASSREPORT_H
 #define PIKO_DRIVER_PASSREPORT_H

@@ -9,7 +9,7 @@
 
 namespace piko {
 
-/// What is behind the first `begin` bytes of a buffer.
+/// What is after the first `begin` bytes of a buffer.
 std::unique_ptr<llvm::MemoryBuffer>
 dropFront(std::unique_ptr<llvm::MemoryBuffer> buffer, size_t begin);
 

@@ -49,7 +49,7 @@ uint64_t hashOutcome(const Outcome &outcome);
 /// The leaves of a record. Throws std::runtime_error.
 std::vector<Field> getFields(pikort_pipeline *pipeline, int32_t record);
 
-/// What a pipeline holds behind a run: all state that is not empty. Throws
+/// What a pipeline holds after a run: all state that is not empty. Throws
 /// std::runtime_error.
 Outcome readOutcome(pikort_pipeline *pipeline);
 

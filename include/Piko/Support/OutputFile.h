@@ -47,7 +47,7 @@ private:
 /// left on device".
 Result<Done> replaceFile(const std::string &path, std::string_view content);
 
-/// The same, with "cannot write 'PATH': " in front of the error.
+/// The same, with "cannot write 'PATH': " before the error.
 Result<Done> writeFile(const std::string &path, std::string_view content);
 
 /// Writes out what is buffered for the standard output. Each tool calls it

@@ -10,23 +10,19 @@ include "mlir/Pass/PassBase.td"
 def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
   let summary = "Compute in each process phase as precisely as its stage says";
   let description = [{
-    **Requires** the authored level, with stages as they are written: the
-    operations of one carry its precision through all fusions.
+    **Requires** the authored level, before stages are fused.
 
-    **Does**, in a process phase that says `precision contracted`: makes an
-    addition or a subtraction of a product a `math.fma`, whether the product is
-    used elsewhere, too, or not, and also if both sides of a condition yield one. Of
-    two products the left one is fused. In one that says `precision relaxed`, before that, in f32: makes a division a
-    product with a reciprocal, of a constant the nearest one, otherwise a
-    `piko.approximate_reciprocal` or, if the divisor is a square root, a
-    `piko.approximate_rsqrt`; and a `math.sqrt` a `piko.approximate_sqrt`.
-    `piko::rsqrt`, which computes in f64, is recognised.
+    **Does**, in a process phase that says `precision contracted`: turns each addition
+    or subtraction of a product into a `math.fma`. In a phase that says
+    `precision relaxed`, before that and in f32: turns each division into a product
+    with a reciprocal, a constant or a `piko.approximate_reciprocal`. The reciprocal
+    of a square root is a `piko.approximate_rsqrt`. A `math.sqrt` becomes a
+    `piko.approximate_sqrt`.
 
-    **Guarantees** that no precision is left, and that what is computed is
-    written down: no later pass, no vector form and no number of threads changes
-    a bit of it. Divisions by 0 and by infinities, roots of these and of negative
-    numbers, and NaNs give what they do in `strict`. A phase that says nothing,
-    `assign` and `schedule` stay as they are.
+    **Guarantees** that no precision is left, and that what is computed is written
+    down: no later pass, vector form or number of threads changes a bit of it.
+    Divisions by 0 and by infinities, roots of these and of negative numbers, and NaNs
+    give what they do in `strict`.
 
     Before:
     ```
@@ -51,20 +47,20 @@ def ApplyPrecision : Pass<"piko-apply-precision", "::piko::PipelineOp"> {
 }
 
 def NormalizeLoops : Pass<"piko-normalize-loops"> {
-  let summary = "Put the work of a loop behind its condition";
+  let summary = "Put the work of a loop under its condition";
   let description = [{
-    **Requires** nothing in particular; it works on `scf` in any operation.
+    **Requires** nothing in particular: it works on `scf` in any operation.
 
-    **Does**: exchanges the arms of an `scf.if` whose first does nothing; makes an
-    `scf.if` of an `scf.index_switch` of a truth value; makes truth values of the
-    flags that arms yield as numbers, and conjunctions of those that an arm yields
-    where the other yields false, if they can be computed in front; moves what
-    stands in an `scf.if` with the loop's own condition, in front of that
-    condition, behind it.
+    **Does**: exchanges the arms of an `scf.if` whose first does nothing. Makes an
+    `scf.if` of an `scf.index_switch` of a truth value. Makes truth values of the
+    flags that arms yield as numbers. Makes a conjunction of a truth value that one
+    arm yields where the other yields false, if it can be computed before. Moves the
+    work of an `scf.while` that stands before the condition, in an `scf.if` with that
+    condition, after it.
 
     **Guarantees** the same effects in the same order. Loops that were made of
-    branches, with `<=`, with `break` or `continue`, then look like those with a
-    simple condition, which other passes expect.
+    branches, with `<=`, with `break` or `continue`, then have a simple condition,
+    which other passes expect.
 
     Before:
     ```
@@ -92,8 +88,8 @@ def NormalizeLoops : Pass<"piko-normalize-loops"> {
     }
     ```
 
-    **Limits**: a condition that is known only after an effect, as with a `break`
-    behind an emission, stays in front of its work.
+    **Limits**: where a condition is known only after an effect, as with a `break`
+    after an emission, the work stays before it.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
@@ -101,17 +97,17 @@ def NormalizeLoops : Pass<"piko-normalize-loops"> {
 def UpliftPixelLoops : Pass<"piko-uplift-pixel-loops", "::piko::PipelineOp"> {
   let summary = "Uplift counted loops over pixels to piko.parallel_pixels";
   let description = [{
-    **Requires** the authored level, and loops as `piko-normalize-loops` leaves
-    them.
+    **Requires** the authored level, and loops as `piko-normalize-loops` leaves them.
 
-    **Does**: makes a `piko.parallel_pixels` of a nest of counted loops in a
-    process phase, as many as the pipeline has dimensions, whose counters are the
-    coordinates of a pixel of the bin, x the fastest. Pure operations between the
-    loops move into the body. Iterations are independent: they hand nothing on,
-    leave the loop nowhere, change state by updates and stores of their own pixel
-    and by atomics that give nothing, read what the loop changes at their own
-    pixel only, and store to their own arrays. A test around the whole body that
-    keeps the pixel in the bin becomes a part of the box.
+    **Does**: turns a nest of counted loops in a process phase into a
+    `piko.parallel_pixels`. The nest has a loop for each dimension of the pipeline,
+    whose counter is a coordinate of a pixel of the bin. Pure operations between the
+    loops move into the body. A test around the body that keeps the pixel in the bin
+    becomes part of the box.
+
+    Iterations hand nothing on and leave the loop nowhere. They change state by
+    updates and stores of their own pixel, and by atomics that give nothing. They read
+    what the loop changes at their own pixel only, and store to their own arrays.
 
     **Guarantees** the same emissions and updates, in the same order.
 
@@ -141,8 +137,8 @@ def UpliftPixelLoops : Pass<"piko-uplift-pixel-loops", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: loops that count by 1 upwards, x in y. A remark says of any other
-    nest of loops over pixels what is in the way.
+    **Limits**: loops count by 1 upwards, x in y. A remark says what is in the way of
+    other nests over pixels.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
@@ -152,16 +148,16 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the authored level.
 
-    **Does**: cuts the graph into linear branches, at convergence, divergence
-    and waits, and moves the stages so that branches stand in descending distance
-    of their first stage from the drain; a branch comes later where it depends,
-    by an edge or by `end_stage`, on one that has not come yet. The stages of a
-    cycle of edges are taken together, in order of declaration. Also numbers the
-    stages (`lineage`) by the language's own rule: producers and stages waited
-    for first, otherwise as declared.
+    **Does**: cuts the graph of stages into linear branches, at convergence,
+    divergence and waits. Moves the stages so that branches stand in descending
+    distance of their first stage from the drain. A branch comes later if it depends,
+    by an edge or by `end_stage`, on one that has not come yet. The stages of a cycle
+    of edges are taken together, in order of declaration. Numbers the stages
+    (`lineage`) by the language's own rule: producers and stages waited for first,
+    otherwise as declared.
 
-    **Guarantees** that each stage stands behind all stages that feed it or that
-    it waits for, but for those on a cycle with it.
+    **Guarantees** that each stage stands after all stages that feed it or that it
+    waits for, but for those on a cycle with it.
 
     Before, with `@a` feeding `@b`, and `@b` itself and `@c`:
     ```
@@ -176,8 +172,8 @@ def OrderStages : Pass<"piko-order-stages", "::piko::PipelineOp"> {
     piko.stage @c ... lineage 2 ...
     ```
 
-    **Limits**: a stage that waits for itself or for one that it feeds gets an
-    error, as do stages that wait for each other.
+    **Limits**: a stage that waits for itself or for one that it feeds is an error.
+    Stages that wait for each other are, too.
   }];
 }
 
@@ -186,19 +182,12 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the authored level with stages in order (`piko-order-stages`).
 
-    **Does**: turns the one `piko.assign_to` of an assign phase into a
-    `piko.assign_previous` where it is proved that the bin is that which the
-    primitive was emitted from. There are two proofs. *By range*: the bin is that
-    of a cell, and wherever a producer emits a primitive the cell's coordinates
-    lie between the bounds of the producer's bin. That follows from a system of
-    linear inequalities: of loops and how their arguments change from turn to
-    turn, of conditions on the way, minima and maxima, quotients, remainders,
-    shifts and masks, of floats that are whole numbers, of truth values, and of
-    how the producer's own bin was chosen, for the primitive or for each one of a
-    list that it reads at an index in the list. *By function*: the bin is computed
-    from fields as the producer's was from its own, and what goes into it is
-    handed on unchanged. A condition around the assignment stays, so that a
-    primitive is in at most that bin.
+    **Does**: turns the only `piko.assign_to` of an assign phase into a
+    `piko.assign_previous` where the bin is proved to be that which the primitive was
+    emitted from. *By range*: linear inequalities show that wherever a primitive is
+    emitted, its cell lies between the bounds of the producer's bin. *By function*:
+    the bin is computed from fields, handed on unchanged, as the producer's was from
+    its own. A condition around the assignment stays.
 
     **Guarantees** that every primitive stays in the same bins.
 
@@ -215,29 +204,26 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
         piko.assign_previous inferred
     ```
 
-    **Limits**: producers and the stage have bins of one size, and the stage has
-    no source. On a cycle only what was proved for stages before it is used.
-    Arithmetic that may wrap around proves nothing: of `hi + 1` with any `hi`
-    nothing is known, of `min(hi, end - 1) + 1` all. A remark says which
-    coordinate could not be proved to be inside, where, and at which bound.
+    **Limits**: producers and the stage have bins of one size, and the stage has no
+    source. On a cycle only what was proved for stages before it is used. Arithmetic
+    that may wrap around proves nothing. A remark says which coordinate is not proved,
+    and at which bound.
   }];
 }
 
 def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
-  let summary = "Choose cores before there are bins";
+  let summary = "Make directives of schedules that say the same of every bin";
   let description = [{
-    **Requires** the authored level; best after canonicalization, which folds
-    what a schedule computes.
+    **Requires** the authored level; best after canonicalization, which folds what a
+    schedule computes.
 
-    **Does**: follows all ways through the `dynamic` body of each schedule. Where
-    they all end with the same directives, these become the schedule's own, and
-    the body is erased. A schedule without a body that is `direct_map`,
-    `serialize` or `all` becomes `resolved`: the core that a bin runs on follows
-    from its number when primitives are assigned. So nothing runs for each bin,
-    `piko-fuse-stages`, which needs to know the kind, sees it, and the kernel's
-    loop is one in which a thread takes its own units of work (`direct_map`), a
-    sequential one (`serialize`) or OpenMP's dynamic one (`all`). What is not
-    resolved asks the runtime's scheduler for each unit.
+    **Does**: follows all ways through the `dynamic` body of each schedule. Where they
+    all end with the same directives, these become the schedule's own, and the body is
+    erased. Nothing then runs for each bin, and `piko-fuse-stages` sees the kind. A
+    schedule without a body that is `direct_map`, `serialize` or `all` becomes
+    `resolved`. On a CPU, `serialize` then makes a sequential loop of the units of a
+    kernel (`piko-form-units`). Of any other kernel, threads ask the runtime for each
+    unit, `resolved` or not.
 
     **Guarantees** that each bin has the directives that it had.
 
@@ -260,36 +246,30 @@ def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
     piko.schedule serialize resolved
     ```
 
-    **Limits**: a schedule that depends on its bin or on the state's constants
-    keeps its body, which runs for each bin, before the pipeline does; a remark
-    says what it depends on. So does one that would end with an error.
+    **Limits**: a schedule that depends on its bin or on the state's constants keeps
+    its body, which runs for each bin before the pipeline does. So does one that would
+    end with an error. A remark says why.
   }];
 }
 
 def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
   let summary = "Run a stage where its primitives are emitted";
   let description = [{
-    **Requires** the authored level with stages in order (`piko-order-stages`);
-    best after `piko-infer-directives`.
+    **Requires** the authored level with stages in order (`piko-order-stages`); best
+    after `piko-infer-directives`.
 
-    **Does**: makes a stage part of the one that feeds it, so that both have one
-    kernel and no primitive is stored between them: each `piko.emit` becomes the
-    body of the consumer's process phase, inside the conditions of its assign
-    phase, with the emitted numbers in place of fields. Both have bins of one
-    size, one edge and no source lead to the consumer, its only assignment is
-    `piko.assign_previous` (or one bin is the whole domain), it does not wait,
-    and both schedules put a bin onto the same core: they are `direct_map`,
-    `serialize` or `all` alike, or the consumer has none. `load_balance` on the
-    consumer keeps it apart, because it asks for any core.
+    **Does**: makes a stage part of the one that feeds it (loop fusion). Each
+    `piko.emit` becomes the consumer's process phase, under the conditions of its
+    assign phase, with numbers in place of fields. Both run for the same bin
+    (`piko.assign_previous`) on the same core. One edge and no source lead to the
+    consumer. It has no schedule, or one of the producer's kind that is not
+    `load_balance`.
 
-    **Guarantees** that updates of a pixel and emissions keep their lineage
-    order. The stage notes in `fused` whose phases it holds, and each access to
-    state whose phase it is from.
+    A consumer with loops that is fed from a loop, and emits further, stays apart
+    (loop fission). `after` lets `piko-fuse-kernels` put a list between the two, from
+    which vectors are full.
 
-    A consumer with loops, which what a producer emits in a loop would be put
-    into, is left apart if it emits in turn: it runs `behind`, so that
-    `piko-fuse-kernels` makes one kernel of both, with a list of the bin between
-    them (loop fission). From the list, lanes of vectors are full.
+    **Guarantees** that updates of a pixel and emissions keep their lineage order.
 
     Before:
     ```
@@ -309,34 +289,32 @@ def FuseStages : Pass<"piko-fuse-stages", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: a stage on a cycle, one that collects (see `piko-fuse-kernels`)
-    and one whose iterations meet at barriers are not fused. Neither is one that
-    would be copied to more than `max-copies` places. A remark gives the reason
-    for each edge that stays.
+    **Limits**: stages on a cycle, that collect, with iterations that meet, or with
+    more than `max-copies` copies stay. A remark gives the reason for each edge.
   }];
   let options = [
     Option<"maxCopies", "max-copies", "int64_t", "4",
            "To how many places a stage may be copied">,
     Option<"fission", "fission", "bool", "true",
-           "Leave apart what is better run behind its producer">];
+           "Leave apart what is better run after its producer">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::ub::UBDialect"];
 }
 
 def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
-  let summary = "Move work behind the test that decides whether it is needed";
+  let summary = "Move work under the test that decides whether it is needed";
   let description = [{
-    **Requires** the authored level; best after `piko-fuse-stages`, which brings
-    a test and the work in front of it together.
+    **Requires** the authored level; best after `piko-fuse-stages`, which brings a
+    test and the work before it together.
 
-    **Does**: moves what a process phase computes into the one branch that uses
-    it, behind whatever decides about the branch, such as the update of a depth.
-    So a fragment that fails the depth test is not shaded.
+    **Does**: moves what a process phase computes into the one branch that uses it.
+    The work then comes after whatever decides about the branch, such as the update of
+    a depth. So a fragment that fails the depth test is not shaded.
 
-    **Guarantees** that what moves has no effect and reads no state that the
-    phase writes, so that results stay as they are. It does not matter how the
-    test is written, because it is not repeated but stays where it is.
+    **Guarantees** that what moves has no effect and reads no state that the phase
+    writes, so that results stay as they are. The test may be written in any way: it
+    is not repeated, but stays where it is.
 
     Before:
     ```
@@ -356,22 +334,22 @@ def TestEarly : Pass<"piko-test-early", "::piko::PipelineOp"> {
     ```
 
     **Limits**: work in one stage for a test in another that is not fused with it
-    stays; so does what two branches need.
+    stays. What two branches need stays, too.
   }];
 }
 
 def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
   let summary = "Find indices that need no test when the pipeline runs";
   let description = [{
-    **Requires** the authored level; last, because what moves an access out of
-    the condition that proves something about it would be wrong behind this.
+    **Requires** the authored level. It runs last: an access that moved out of the
+    condition that proves something about it would be wrong after this.
 
     **Does**: marks accesses to buffers, images and lists as `checked` where each
-    index is at least 0 and less than the extent, and updates (`piko.inside`)
-    whose coordinates lie between the bounds of the bin; both as
-    `piko-infer-directives` proves it.
+    index is at least 0 and less than the extent. Marks updates, and loads and stores
+    of images, with `piko.inside` where their coordinates lie between the bounds of
+    the bin. Both are proved as in `piko-infer-directives`.
 
-    **Guarantees** that no access is outside that was not.
+    **Guarantees** that no access that is marked is outside.
 
     Before:
     ```
@@ -384,10 +362,10 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
       %x = piko.load checked @lights[%i : index] "x" : f32
     ```
 
-    **Limits**: what follows from the contents of buffers, or from constants that
-    the host sets, is not known; nor is it known of a buffer, as it is of the
-    domain, that it has an element at all, so that an index clamped to it, or a
-    remainder, is still tested. A remark names each access that is.
+    **Limits**: what follows from the contents of buffers, or from constants that the
+    host sets, is not known. Nor is it known of a buffer, as it is of the domain, that
+    it has an element at all. An index that is clamped to it, or a remainder, is
+    therefore tested. A remark names each access that is.
   }];
 }
 
@@ -396,14 +374,14 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the authored level.
 
-    **Does**: where all updates of a stage are at one pixel that follows from
-    the primitive's fields and constants alone, copies that computation to the
-    front of the assign phase, with a `piko.owner` behind it. The stage then gets tiles of
-    `tile` cells a side (which bins that are smaller do not have), and threads
-    that each take tiles of a bin still update every pixel in lineage order.
+    **Does**: where all updates of a stage are at one pixel that follows from the
+    primitive's fields and constants alone, copies that computation to the start of
+    the assign phase, with a `piko.owner` after it. The stage then gets tiles of
+    `tile` cells a side. Threads that each take tiles of a bin still update every
+    pixel in lineage order. Bins that are no larger than a tile get none.
 
-    **Guarantees** that the pixels that a stage changes and the order in which it
-    does so stay as they are.
+    **Guarantees** that the pixels that a stage changes, and the order in which it
+    does so, stay as they are.
 
     Before:
     ```
@@ -413,7 +391,7 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
       %y = piko.get %f "y" : !piko.prim<@F> -> i32
       piko.update @depth[%x, %y : i32, i32] { ... }
     ```
-    After, in front of it:
+    After, before it:
     ```
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -424,9 +402,8 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
       piko.assign_to %zero
     ```
 
-    **Limits**: an update at several pixels, at one that is read from a
-    buffer or an image, or for a list, is refused with a remark; one thread then
-    takes each bin.
+    **Limits**: updates at several pixels, at one that is read from a buffer or an
+    image, or of a list, are refused with a remark. One thread then takes each bin.
   }];
   let options = [
     Option<"tile", "tile", "int64_t", "32",
@@ -435,16 +412,16 @@ def OwnPixels : Pass<"piko-own-pixels", "::piko::PipelineOp"> {
 
 def EliminateSchedules
     : Pass<"piko-eliminate-schedules", "::piko::PipelineOp"> {
-  let summary = "Leave load balancing to the parallel loop";
+  let summary = "Erase schedules that ask for no more than load balancing";
   let description = [{
     **Requires** the authored or the kernels level; best after `piko-fuse-stages`,
-    for which it matters whether a stage asks for a core.
+    which leaves a consumer apart that asks for `load_balance`.
 
-    **Does**: erases schedules that say `load_balance` and no more; one that also
-    waits, takes batches or gives up an order becomes `resolved`. The kernel's
-    loop over units of work is then OpenMP's own with a dynamic schedule, or a
-    GPU's grid; the runtime's scheduler, which looks up who owns a unit, is not
-    asked.
+    **Does**: erases schedules that say `load_balance` and no more, which is what a
+    stage without a schedule has. One that also waits, takes batches, runs for every
+    bin, gives up an order or says its lanes becomes `resolved`. The kernel's code
+    does not change: on a CPU threads still ask the runtime for each unit, and on a
+    GPU blocks take the next ones from a counter of the launch.
 
     **Guarantees** that the stage's bins run as before.
 
@@ -462,8 +439,8 @@ def EliminateSchedules
     }
     ```
 
-    **Limits**: a schedule with a `dynamic` body stays with the runtime, which
-    has to look at each bin.
+    **Limits**: a schedule with a `dynamic` body stays, because the runtime has to
+    look at each bin.
   }];
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Passes on loops over units of work on the CPU: what they test and fetch, and
-// the order of their turns.
+// the order of their iterations.
 
 #ifndef PIKO_TRANSFORMS_CPUPASSES_TD
 #define PIKO_TRANSFORMS_CPUPASSES_TD
@@ -9,32 +9,20 @@
 include "mlir/Pass/PassBase.td"
 
 def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
-  let summary = "Ask for what later primitives refer to";
+  let summary = "Prefetch what later primitives refer to";
   let description = [{
     **Requires** loops over units (`piko-form-units`).
 
-    **Does**: a loop over the primitives of a bin that reads state at indices
-    which are fields of the primitive asks for the elements of a primitive
-    further on (`piko.prefetch`), and for a primitive still further on
-    (`piko.cpu.prefetch_item`): neither lies in memory in the order of the bin
-    (S. Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
-    Accesses", 2017). Where primitives refer to nothing, they are asked for
-    themselves, if they were put into the bin from others, and have more than 16
-    bytes: smaller ones are copied into order. A stage with one bin for all takes
-    its primitives as they were made, whose neighbours mostly refer to the same;
-    it is left alone.
+    **Does**: software prefetching of indirect accesses. Loops over the primitives of a
+    bin that read state at fields of the primitive prefetch these elements 8 primitives
+    ahead (`piko.prefetch`), and primitives 16 ahead (`piko.cpu.prefetch_item`).
+    Primitives that refer to nothing are prefetched if they are scattered and have more
+    than 16 bytes. Loops over rows whose pixels read up to three places, each from the
+    one before, prefetch in stages: the last a row ahead, each earlier one a row
+    further. Buffers that the nearest caches hold have no stage.
 
-    A loop over rows of pixels that reads a place from memory, as the number of
-    the triangle that is seen, asks in stages, a row further on for each read on
-    the way: for the corners of triangles of the next row, for the triangles of
-    the row behind it, and for the numbers of the third one. Of pixels that refer
-    to the same as those of the row before, nothing is asked. There is no stage
-    for buffers that the nearest caches hold (4 MiB), nor for what pixels read at
-    their own place if it is less than 1 MiB: in larger images each row of a bin
-    is on a page of its own, where no hardware prefetcher follows.
-
-    **Guarantees** that nothing changes but time: a prefetch reads nothing and
-    cannot fail.
+    **Guarantees** that nothing changes but time: no prefetch fails, and the reads that
+    lead to one stay inside their buffers.
 
     Before:
     ```
@@ -55,33 +43,28 @@ def Prefetch : Pass<"piko-prefetch", "::piko::PipelineOp"> {
       %t = piko.storage.item %bins[%i] ...
     ```
 
-    **Limits**: of primitives, indices that are computed, and those of reads that
-    only the much longer side of a condition does, are not followed. Of pixels,
-    only reads of buffers are, and of state that the loop does not change, not in
-    boxes nor for each primitive.
+    **Limits**: computed indices of primitives, stages with one bin for all, reads on
+    the much longer side of a condition, state that a loop over rows changes, and boxes
+    have no prefetches.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
 
 def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
-  let summary = "Test the indices of a loop in front of it";
+  let summary = "Test the indices of a loop before it";
   let description = [{
-    **Requires** loops over units (`piko-form-units`); last before `convert-piko-to-scf`, because
-    behind it loops stand there twice.
+    **Requires** loops over units (`piko-form-units`); last before
+    `convert-piko-to-scf`, as nests stand there twice after it.
 
-    **Does**: takes nests of loops, outermost first, in which the range of each
-    index that is tested is known in front: sums, products, minima, maxima,
-    choices and remainders of numbers that do not change and of counts by one, and
-    their quotients, shifts and masks by constants.
-    Interval arithmetic in front of the nest finds the least and the greatest
-    index, and a test whether all are inside, and nothing wraps around; then a
-    copy of the nest runs whose accesses are `checked`, and whose divisions that
-    are known to have a result are not tested either. An innermost loop in which
-    each index is a sum with the count at most once gets indices that LLVM sees
-    to be in a row, so that it can form vectors. Otherwise the nest runs as it
-    was.
+    **Does**: loop versioning by interval arithmetic. It takes nests of loops, outermost
+    first, in which the range of each tested index is known before the nest: sums,
+    products, minima, maxima, choices and remainders of invariants and counts, and
+    quotients, shifts and masks by constants. Where a test before the nest finds all
+    inside, a copy runs, whose accesses are `checked` and whose remainders are not
+    tested; else the nest runs as it was. An innermost loop gets consecutive indices, so
+    that LLVM can form vectors.
 
-    **Guarantees** the same accesses in the same order, and the same errors.
+    **Guarantees** the same accesses in order, and the same errors.
 
     Before:
     ```
@@ -100,10 +83,9 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: a nest with another index, as one of 32 bits that is read from a
-    buffer, stays, and the loops inside it are looked at; long nests, and those in
-    which nothing is tested, stay, too. A loop that counts down, or by another
-    number than one, has no range.
+    **Limits**: with another index, as one of 32 bits from a buffer, only inner loops
+    are looked at. Larger nests than the options say stay. A loop that counts down, or
+    not by one, has no range.
   }];
   let options = [
     Option<"maxOperations", "max-operations", "int64_t", "64",
@@ -113,18 +95,18 @@ def HoistBounds : Pass<"piko-hoist-bounds", "::piko::PipelineOp"> {
 }
 
 def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
-  let summary = "Read in front of a loop what its condition reads";
+  let summary = "Read before a loop what its condition reads";
   let description = [{
-    **Requires** loops over units (`piko-form-units`); before `piko-hoist-bounds`
-    and `piko-vectorize`, which look for loops that count to a number that they
-    know in front.
+    **Requires** loops over units (`piko-form-units`); before `piko-hoist-bounds` and
+    `piko-vectorize`, which look for loops with a bound that is known before them.
 
-    **Does**: a number that a loop's condition reads from state without an index,
-    and that the kernel does not change, as an extent that the user keeps with a
-    buffer, is read in front of the loop, with what is computed from it alone.
+    **Does**: loop-invariant code motion. A loop's condition may read a number from
+    state without an index, as an extent that the user keeps with a buffer. If the
+    kernel does not change it, it is read before the loop, with what is computed from it
+    alone.
 
     **Guarantees** the same numbers: such a read cannot fail, and a condition is
-    found at least once.
+    evaluated at least once.
 
     Before:
     ```
@@ -143,22 +125,22 @@ def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
     } do { ... }
     ```
 
-    **Limits**: elements of arrays and buffers stay, as their indices are tested;
-    so does what is read behind a loop's condition, which LLVM moves.
+    **Limits**: elements of arrays and buffers stay, as their indices are tested; so
+    does what a loop's body reads, which LLVM moves.
   }];
 }
 
 def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let summary = "Choose values without branches";
   let description = [{
-    **Requires** loops over units (`piko-form-units`); before `piko-vectorize`, which has no branches
-    to mask then.
+    **Requires** loops over units (`piko-form-units`); before `piko-vectorize`, which
+    then has no branches to mask.
 
-    **Does**: takes `scf.if` and `scf.index_switch` whose arms do nothing but
-    read fields, compare, convert and choose, moves what the arms hold in front,
-    and chooses each result by `arith.select`. `vector[axis]` and `h == 12 || h
-    == 14 ? x : z` come as such switches, and what they choose by is often not
-    predictable.
+    **Does**: if-conversion. It takes `scf.if` and `scf.index_switch` whose arms only
+    read fields and compare, convert and choose integers. What the arms hold moves
+    before the choice, and each result becomes an `arith.select`. `vector[axis]` and
+    `h == 12 || h == 14 ? x : z` come as such switches, and what they choose by is often
+    not predictable.
 
     **Guarantees** the same values.
 
@@ -178,8 +160,8 @@ def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
     %x = arith.select %is_0, %a, %b : f32
     ```
 
-    **Limits**: arms that compute with floats, read state or have an effect stay,
-    as do those of a choice without results.
+    **Limits**: arms that do arithmetic, compare floats, read state or have an effect
+    stay, as do those of a choice without results.
   }];
   let options = [
     Option<"maxCases", "max-cases", "int64_t", "4",
@@ -194,18 +176,16 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
   let description = [{
     **Requires** access to state that is tested (`convert-piko-to-scf`).
 
-    **Does**: of the tests that have the same outcome, each of which guards a read
-    of the same buffer or image, the first one guards all of the reads. So there is
-    one branch for an element, and its address is computed once, also where lanes
-    read elements in different places. What is read of the same element behind a
-    condition is read along, if the record is not larger than a line of the cache.
-    Tests that guard writes to fields of the same element become the last of them,
-    so that lanes can write these at once.
+    **Does**: merges tests with the same condition, each of which guards a read of the
+    same buffer or image, into the first one. So an element has one branch, and one
+    address, also where lanes read in different places. Reads of the element under
+    further conditions join if the record is no larger than a cache line. Tests that
+    guard writes to the same state become the last of them, so that lanes can write its
+    fields at once.
 
-    **Guarantees** the same numbers: what the kernel changes is read at the place of
-    the first only where nothing in between writes the field, and written at that of
-    the last only where nothing in between uses it; and the same errors, whose text
-    names the index but no field, in the same order.
+    **Guarantees** the same numbers: of what the kernel changes, nothing between two
+    tests writes the field of a read that joins, or uses that of a write. Errors, whose
+    text names the index but no field, keep their order.
 
     Before:
     ```
@@ -229,26 +209,26 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
     %square = arith.mulf %xy#0, %xy#0 : f32
     ```
 
-    **Limits**: reads in conditions of state that the kernel changes keep their
-    tests; so do writes with another test between them.
+    **Limits**: conditional reads of state that the kernel changes keep their tests; so
+    do writes with another test between them.
   }];
 }
 
 def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
-  let summary = "Put work behind the conditions that need it";
+  let summary = "Put work under the conditions that need it";
   let description = [{
     **Requires** loops over units (`convert-piko-to-scf`).
 
     **Does**: short-circuit evaluation and jump threading, which undo what earlier
-    passes put in front of conditions to see through them. Of a conjunction, the
-    right half, or else the left one, if it takes work, moves behind the other,
-    with what else serves only the sides. A condition that is known on one side of an earlier one, and does
-    nothing there, moves into the other side. So lanes of which none passes the
-    first test do nothing else. A condition that asks whether any bit of a number
-    is set, which bits of a float are that one around it compares with 0, goes.
+    passes put before conditions to see through them. Of a conjunction, the right half,
+    or else the left one, moves under the other if it takes work (`min-weight`), with
+    what else serves only the sides. A condition that is known, and does nothing, on one
+    side of an earlier one moves into the other side. So lanes of which none passes the
+    first test do nothing else. A test whether any bit of a float is set goes where a
+    condition around it has found that the float is not 0.
 
-    **Guarantees** the same results: what moves has no effects, or moves past
-    nothing that has.
+    **Guarantees** the same results: what moves has no effects, or moves past nothing
+    that has.
 
     Before:
     ```
@@ -276,7 +256,7 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: conditions with results do not move behind others.
+    **Limits**: conditions with results are not threaded.
   }];
   let options = [
     Option<"minWeight", "min-weight", "int64_t", /*default=*/"4",
@@ -284,20 +264,19 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
 }
 
 def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> {
-  let summary = "Compute once what each turn of an inner loop computes alike";
+  let summary = "Compute once what each iteration of an inner loop computes alike";
   let description = [{
-    **Requires** loops over units (`convert-piko-to-scf`); best behind
-    `piko-vectorize`, where what lanes share is scalar.
+    **Requires** loops over units (`convert-piko-to-scf`); best after `piko-vectorize`,
+    where what lanes share is scalar.
 
-    **Does**: where an inner loop, as one over lights, is in others, as those over
-    pixels, and a number that takes a root or a division follows from the turn's
-    own number and from state that the kernel does not change, such as the length
-    of a light's direction, a loop in front of all others computes it for each turn
-    into an array (scalar expansion), from which the inner loop reads it. With fewer
-    than 32 turns, or more than 1,024, the loop runs as it was.
+    **Does**: loop-invariant code motion by scalar expansion. A float in an inner loop,
+    such as one over lights, may take a root or a division, and follow from the
+    iteration's number and from state that the kernel does not change. A loop before all
+    others then computes it for each iteration into an array, from which the inner loop
+    reads it. With fewer than 32 iterations, more than 1,024, or more than the state has
+    elements, the loop runs as it was.
 
-    **Guarantees** the same bits: what is read is what was computed, and the places
-    read are those of the loop's own turns.
+    **Guarantees** the same bits.
 
     Before:
     ```
@@ -319,8 +298,8 @@ def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> 
           %root = memref.load %lengths[%i] : memref<1024xf32>
     ```
 
-    **Limits**: loops that count from 0 by one, up to a number that does not
-    change, and of state the elements of the turns' own numbers.
+    **Limits**: loops that count from 0 by one, up to a number that does not change, and
+    of state the elements of the iterations' own numbers.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
@@ -328,20 +307,19 @@ def TabulateInvariants : Pass<"piko-tabulate-invariants", "::piko::PipelineOp"> 
 }
 
 def UnrollAndJam : Pass<"piko-unroll-and-jam", "::piko::PipelineOp"> {
-  let summary = "Let turns of a loop share the loop inside of it";
+  let summary = "Let iterations of a loop share the loop inside of it";
   let description = [{
-    **Requires** loops over units (`convert-piko-to-scf`); best behind
+    **Requires** loops over units (`convert-piko-to-scf`); best after
     `piko-merge-bounds`, where accesses need no test.
 
-    **Does**: where a loop ends with an inner one, whose turns change the same
-    elements in each turn of the outer loop, as sums of products of matrices do,
-    four turns of the outer loop share one run of the inner one: what a copy stores
-    is handed on to the next, so that each element is loaded and stored once for
-    four. What is left over runs as it was.
+    **Does**: unroll-and-jam by four. It takes loops that end with an inner loop which
+    changes the same elements in each outer iteration, as sums of products of matrices
+    do. Four outer iterations share one run of the inner loop, and a copy hands what it
+    stores to the next. So each element is loaded and stored once for four. The
+    remainder runs as it was.
 
-    **Guarantees** the same bits: turns that change the same element do so in their
-    order, because it is the same turn of the inner loop in which they do. Private
-    arrays are treated as state is.
+    **Guarantees** the same bits: all changes of an element are in one iteration of the
+    inner loop, and keep their order there.
 
     Before:
     ```
@@ -365,11 +343,9 @@ def UnrollAndJam : Pass<"piko-unroll-and-jam", "::piko::PipelineOp"> {
     scf.for %k = %end to %n step %one { ... }
     ```
 
-    **Limits**: both loops count up by one, to numbers that neither changes; the
-    inner one has up to 24 operations, no control flow and no test of an index,
-    and is not known to turn less than six times.
-    An index of what is changed must be the inner count, or a sum of it and of
-    what neither loop changes; a remark says where it is not.
+    **Limits**: both loops count by one, up to invariants. The inner one has up to 24
+    operations, no control flow, no tested index, and at least six iterations as far as
+    is known. What changes is indexed by its count, or by sums of that and invariants.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::memref::MemRefDialect",
@@ -381,30 +357,16 @@ def ReduceUpdates : Pass<"piko-reduce-updates", "::mlir::ModuleOp"> {
   let description = [{
     **Requires** loops over units (`piko-form-units`).
 
-    **Does**: updates of a pixel run in order of lineage, so that one thread runs a
-    bin that is the whole domain, unless each primitive updates one pixel that is
-    known before (`piko-own-pixels`). Where all that the kernel's updates do is an
-    arg-min reduction, threads share the bin. Each gets images of its own
-    (`piko.cpu.private_images`), and notes in one more, an internal one, by which
-    unit of work a pixel was changed last. When the kernel ends, the runtime
-    selects for each pixel what is first by the key, and among equal keys by the
-    unit, in parallel, by a function that `convert-piko-to-llvm` makes. The first
-    thread has the state itself.
+    **Does**: lets threads share a bin that is the whole domain, which one thread runs
+    otherwise, in lineage order. Where all updates of a kernel are arg-min reductions,
+    each thread gets private images (`piko.cpu.private_images`), and notes in an
+    internal one which unit changed a pixel last. When the kernel ends, the runtime
+    selects what is first by the key, then by the unit. Images whose numbers each change
+    by one commutative integer operation are changed by `piko.atomic` instead. Remarks
+    say what is selected, or what is in the way.
 
-    An update selects if it gives numbers of the pixel other values on one
-    condition, which compares new numbers with those that they replace: `<`, `<=`,
-    `>` and `>=`, and what is compared where they are equal, if that is an integer.
-    What it overwrites without any condition keeps the last. Other images may be
-    overwritten, at the same pixel, where the update says that it has changed
-    something; what is computed there must not fail, and must not leave anything
-    else behind, as it may be done for what another thread's primitives replace.
-
-    Images whose numbers are all changed by one integer operation that commutes and
-    associates, such as a sum, are changed by `piko.atomic` instead, which
-    `piko-privatize` may give private copies.
-
-    **Guarantees** the same bits and the same errors: of what is equal by the key
-    the first in order of lineage is kept, or the last, on any number of threads.
+    **Guarantees** the same bits and errors: of equal keys, the first in lineage order
+    is kept, or the last.
 
     Before:
     ```
@@ -436,11 +398,9 @@ def ReduceUpdates : Pass<"piko-reduce-updates", "::mlir::ModuleOp"> {
       }
     ```
 
-    **Limits**: phases that take lists, stages that host others, and schedules that
-    serialize stay on one thread. Whether sharing is worth the memory, and the time
-    to combine, is known when the pipeline runs: under a limit of memory, and where
-    few primitives come for a large domain, one thread runs the bin. Remarks say
-    what is selected, and what is in the way.
+    **Limits**: phases that take lists, stages that host others, schedules that
+    serialize and checked pipelines stay on one thread. At run time, the bin stays there
+    if primitives are few or memory is limited.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::scf::SCFDialect"];
@@ -451,15 +411,12 @@ def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
   let description = [{
     **Requires** loops over units (`piko-form-units`).
 
-    **Does**: where all that a kernel does to a field of a buffer or an image is
-    `piko.atomic` of one kind, on integers and without results, each thread gets
-    a copy of its own (`piko.cpu.private_copy`), to which it reads and writes
-    without locks. When the kernel ends, the runtime combines the copies with the
-    state, in parallel, and leaves in them what changes nothing, so that the next
-    launch finds them as they must be. It does so for runs of elements that have
-    been written to, by a function that `convert-piko-to-llvm` makes for the field
-    and the kind. The first thread has the state itself: on one thread there is no
-    copy. This is the privatization of reductions of parallelizing compilers.
+    **Does**: privatization of reductions. Where a kernel only changes a field of a
+    buffer or an image by `piko.atomic` of one kind, on integers and without results,
+    each thread gets a copy (`piko.cpu.private_copy`), which it changes without locks.
+    When the kernel ends, the runtime combines the changed parts of all copies with the
+    state, in parallel, and resets them. The first thread has the state itself. Remarks
+    say what has copies, or what is in the way.
 
     **Guarantees** the same bits and the same errors: these operations commute and
     associate, and nothing reads the field before the kernel ends.
@@ -480,11 +437,9 @@ def Privatize : Pass<"piko-privatize", "::piko::PipelineOp"> {
         piko.atomic add checked @counts[%i : i32] "value", %one in %copy : i32
     ```
 
-    **Limits**: whether copies are worth their memory, and the time to combine
-    them, is known when the pipeline runs: there are none for more than 8 threads,
-    for state of more than 64 MiB, under a limit of memory, and where few
-    primitives come for a large state. Remarks say what has copies and what is in
-    the way of others.
+    **Limits**: at run time, there are no copies for more than 8 threads, for state of
+    more than 64 MiB, under a limit of memory, or where few primitives come for a large
+    state.
   }];
 }
 

@@ -12,17 +12,15 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
   let description = [{
     **Requires** the authored level, no `piko.check_*` yet.
 
-    **Does**: gives each record of a primitive a longer form whose last field is
-    the primitive's lineage, and tells the runtime of each call, emission, access
-    to a buffer or an image, iteration and barrier. Tests the fields in
-    `numbers` for NaN where they are emitted, and makes flags that follow each
-    `piko.undefined` to where it is emitted or stored. Indices of local arrays
-    and of arrays in fields go through a `piko.check_index`, and each
-    `scf.while` ends when a `piko.check_trip` says so.
+    **Does**: gives each record of a primitive a longer form, whose last field is the
+    primitive's lineage. It tells the runtime of each call, emission, access to a buffer
+    or an image, parallel iteration and barrier. It tests the fields in `numbers` for
+    NaN where they are emitted, and follows each `piko.undefined` by flags to where it
+    is emitted or stored. Indices of local arrays and of arrays in fields go through
+    `piko.check_index`. `piko.check_trip` may end an `scf.while`.
 
-    **Guarantees** that the results of a run without findings stay as they are,
-    and that no `piko.undefined` is left. An access to state that is none of the
-    dialect's is an error, because its element is not known.
+    **Guarantees** that the results of a run without findings stay as they are, and that
+    no process phase has a `piko.undefined`.
 
     Before:
     ```
@@ -38,9 +36,9 @@ def AddChecks : Pass<"piko-add-checks", "::mlir::ModuleOp"> {
     piko.emit 0 (%z, %lineage) : f32, i64
     ```
 
-    **Limits**: elements of private arrays count as written; an index into one
-    of several dimensions, which is a single number by then, is tested as such.
-    The trips of an `scf.for` are not counted.
+    **Limits**: elements of private arrays count as written. An index into several
+    dimensions, which is one number by then, is tested as such. Iterations of `scf.for`
+    are not counted. Access to state by other operations is an error.
   }];
   let options = [
     ListOption<"numbers", "numbers", "std::string",
@@ -54,16 +52,14 @@ def CountWork : Pass<"piko-count-work", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the authored level, with stages as they are written.
 
-    **Does**, in each process phase: counts its calls, the turns of each loop and
-    the iterations of each parallel one, what goes out of each port, the fields
-    of each piece of state that are read and written, the pixels that are
-    updated, and the arithmetic operations on floats and on integers. Each number
-    is a `piko.counter`, whose location is the loop, or the first emission or
-    access.
+    **Does**: counts what each process phase does: its calls, the iterations of each
+    loop, and the emissions, updates and atomics whose innermost loop that is. It also
+    counts emissions by port, accesses by piece of state, and arithmetic operations on
+    floats and on integers. Each number is a `piko.counter`, whose location is the loop,
+    or the first emission or access.
 
-    **Guarantees** that the pipeline computes what it did. Without the passes
-    that fuse and leave out work, the counts are those of the reference: the same
-    on any number of threads.
+    **Guarantees** that the pipeline computes what it did. Without the passes that fuse
+    and leave out work, the counts are those of the reference, on any number of threads.
 
     Before:
     ```
@@ -92,10 +88,10 @@ def CountWork : Pass<"piko-count-work", "::piko::PipelineOp"> {
         piko.emit 0 (%y) : f32
     ```
 
-    **Limits**: what moves, chooses or converts between integers is no
-    arithmetic, nor is the logic of conditions; a function such as an exponential
-    is one operation. Of a loop with a `break` the last turn counts, be it only
-    its test. The assign and schedule phases are not counted.
+    **Limits**: moves, choices, integer conversions and the logic of conditions are no
+    arithmetic; a function such as an exponential is one operation. Of a loop with a
+    `break` the last iteration counts, be it only its test. The assign and schedule
+    phases are not counted.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect"];
 }
@@ -105,11 +101,11 @@ def CountLanes : Pass<"piko-count-lanes", "::piko::PipelineOp"> {
   let description = [{
     **Requires** loops over units, as the last pass on them leaves them.
 
-    **Does**: sums up, in each kernel, the arithmetic operations on scalars, those
-    on vectors, the lanes of these, and how many of the lanes do something: those
-    of the mask whose lanes an `scf.if` or an `scf.while` around them asks for, or
-    of the mask with which their block reads and writes. A unit of work adds up in
-    memory of its own and tells the runtime (`piko.count`) at its end.
+    **Does**: counts, in each kernel, the arithmetic operations on scalars, those on
+    vectors, the lanes of these, and the lanes that are active. A lane is active if it
+    is set in the mask that an `scf.if` or an `scf.while` around the block tests for
+    any, or else in the mask of the block's first masked access. A unit of work adds up
+    in memory of its own, and tells the runtime (`piko.count`) at its end.
 
     **Guarantees** that the pipeline computes what it did, by the same vectors.
 
@@ -133,8 +129,8 @@ def CountLanes : Pass<"piko-count-lanes", "::piko::PipelineOp"> {
       piko.count 1 by %vectors
     ```
 
-    **Limits**: a lane whose result a select drops counts as one that does
-    something. What the runtime does between kernels is not counted.
+    **Limits**: a lane whose result a select drops counts as active. What the runtime
+    does between kernels is not counted.
   }];
   let dependentDialects = ["::mlir::math::MathDialect",
                            "::mlir::memref::MemRefDialect",

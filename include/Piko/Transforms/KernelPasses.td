@@ -12,13 +12,11 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the authored level with stages in order (`piko-order-stages`).
 
-    **Does**: makes a kernel of the process phase of each stage and the assign
-    phases of the stages that its ports feed; and one of the assign phase for
-    each source whose stage has an assign phase. Kernels stand in the order in
-    which they run. A schedule that only says where bins run has no code of its
-    own and stays with the stage.
-    An assign phase that puts everything into the one bin that there is needs no
-    code and is left out.
+    **Does**: makes a kernel of the process phase of each stage and the assign phases
+    of the stages that its ports feed. Makes another one of the assign phase for each
+    source whose stage has an assign phase. Kernels stand in the order in which they
+    run. A schedule stays with its stage. An assign phase that puts everything into
+    the one bin that there is needs no code, and is left out.
 
     **Guarantees** the kernels level: stages hold no process or assign phase.
 
@@ -36,9 +34,9 @@ def FormKernels : Pass<"piko-form-kernels", "::piko::PipelineOp"> {
     piko.kernel @kernel_b { piko.process of @b { ... } }
     ```
 
-    **Limits**: an assign phase that reads state which a stage may still write
-    when the primitives arrive is an error. What can be merged further is for
-    other passes.
+    **Limits**: an assign phase that reads state which a stage may still write when
+    the primitives arrive is an error. What can be merged further is left to other
+    passes.
   }];
 }
 
@@ -48,15 +46,12 @@ def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
     **Requires** the kernels level, before `piko-form-program`; best after
     `piko-infer-directives`.
 
-    **Does**: merges the kernel of a stage that takes a list, or waits with
-    `end_bin`, into the kernel of the stage that feeds it, behind a
-    `piko.local_barrier`. So the wait is for the bin alone, the primitives
-    between the two are stored for one bin of each thread at a time, and as many
-    successive stages as possible run for one bin before the next. Both stages
-    have bins of one size, one edge and no source lead to the consumer, and
-    `piko.assign_previous` is all that assigns it. Schedules put a bin onto one
-    core for both: they are alike, or the consumer's is `load_balance` and the
-    producer does not have `serialize`.
+    **Does**: appends the kernel of a stage that takes a list, or waits with `end_bin`
+    or `after`, to the kernel of the stage that feeds it, after a
+    `piko.local_barrier`. So the wait is for one bin, whose primitives alone are
+    stored between. Both stages have bins of one size. One edge and no source lead to
+    the consumer, which `piko.assign_previous` alone assigns. Schedules are of one
+    kind, or the consumer's is `load_balance` and the producer's not `serialize`.
 
     **Guarantees** that lists, updates of a pixel and emissions keep their lineage
     order.
@@ -79,36 +74,29 @@ def FuseKernels : Pass<"piko-fuse-kernels", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: one thread runs a bin, so that a bin that is the whole domain, or
-    that is cut into tiles, stays with several threads and a kernel break, unless
-    it has `serialize`. So do a stage on a cycle, one that waits with `end_stage`
-    for what runs later than its producer, one with a schedule for each bin, and
-    one that runs for empty bins behind a list that does not. Stages of which one writes state that
-    another one uses are not merged, and no kernel is moved past another such
-    one, unless both only change it atomically; two stages of one kernel may
-    update the same image. Merged kernels do not run in strips. A pipeline that
-    is checked is left as it is. A remark gives the reason for each stage that
-    stays.
+    **Limits**: one thread runs a bin. A kernel break stays where the bin is the whole
+    domain, unless the producer has `serialize`, and where bins are cut into tiles. It
+    stays on cycles, with `dynamic` schedules, and where one stage writes what another
+    uses. A remark says why.
   }];
 }
 
 def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
   let summary = "Say which kernel runs when, and how edges are joined";
   let description = [{
-    **Requires** the kernels level, with kernels as they will run; or the resolved
+    **Requires** the kernels level, with kernels as they will run, or the machine
     level.
 
-    **Does**: makes a `piko.program` of a pipeline that has none. Its launches are
-    in the order in which kernels stand in the pipeline, but that stages on a
-    common cycle run together: in a `piko.waves` if none of them collects, else
-    in a `piko.rounds`, which may have waves inside it. A stage that waits for
-    another one has a `piko.wait` in front of its launch. Each
-    `piko.join` says how its edges are gathered and, where several of them meet,
-    how wide the keys are by which they are merged. A remark says of each edge
-    that is permuted, and of each merge, why.
+    **Does**: makes a `piko.program` of a pipeline that has none. Launches are in the
+    order of kernels, but a kernel comes after what feeds it. Stages on a common cycle
+    run together: in a `piko.waves` if none of them collects, else in a `piko.rounds`,
+    which may hold waves. A `piko.wait` stands before a stage that waits for another
+    one, unless edges lead there. Each `piko.join` says how its edges are gathered,
+    and how wide the keys are by which several are merged. A remark says why an edge
+    is permuted, or edges are merged.
 
     **Guarantees** that what comes to a bin is in lineage order, and that only
-    primitives have keys that will be merged.
+    primitives that will be merged have keys.
 
     Before:
     ```
@@ -117,7 +105,7 @@ def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
     piko.kernel @kernel_a { ... }
     piko.kernel @kernel_b { ... }
     ```
-    After, behind the kernels:
+    After, after the kernels:
     ```
     piko.program {
       %0 = piko.feed 0 : !piko.edge<@F>
@@ -128,7 +116,8 @@ def FormProgram : Pass<"piko-form-program", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: kernels are not moved, but for those of a cycle.
+    **Limits**: a stage without a kernel is an error, and so are waits that cannot
+    end.
   }];
 }
 
@@ -137,20 +126,15 @@ def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
   let description = [{
     **Requires** the kernels level with a `piko.program`.
 
-    **Does**: moves launches in a row into a `piko.strips` where they may run for
-    one strip of a source after another, so that what lies between them stays
-    small. All their primitives come from that source, through edges inside the
-    group. A stage that waits, for a stage before the group, may be in it if its
-    bin is the whole domain or it emits nothing. Stages of which one writes state
-    that another one uses are not in one group, unless both only change it
-    atomically. A cycle is in a group as a whole, and only if none of its stages
-    collects. Where the group's first stage has the schedule `all` with a tile
-    split, and one bin, the tile becomes the `chunk`: depth first, several stages
-    for one tile before the next.
+    **Does**: moves successive launches into a `piko.strips` (strip-mining), so that
+    what lies between them stays small. All their primitives come from one source,
+    through edges inside the group. A stage that waits for one before the group may be
+    in it if its bin is the whole domain or it emits nothing. A cycle is in it as a
+    whole, if none of its stages collects. The tile split of a first stage with `all`
+    and one bin becomes the `chunk`.
 
-    **Guarantees** that the order of launches stays as it is, and that lineage
-    order does not change, however the source is cut. A remark says of each stage
-    that runs in no strips why.
+    **Guarantees** that launches and lineage keep their order, however the source is
+    cut.
 
     Before:
     ```
@@ -173,10 +157,9 @@ def FormStrips : Pass<"piko-form-strips", "::piko::PipelineOp"> {
     } : (!piko.edge<@F>) -> ()
     ```
 
-    **Limits**: strips are of a source's primitives, never of bins, so that a
-    stage that waits and emits from several bins ends a group, as does one that
-    takes a list, or that primitives of two sources reach. Launches that are not
-    in a row are not moved.
+    **Limits**: a stage that takes a list, waits for a bin, or gets primitives of two
+    sources ends a group. So does state that one stage writes and another uses, unless
+    both change it atomically. Remarks say why.
   }];
 }
 

@@ -11,18 +11,18 @@ include "mlir/Pass/PassBase.td"
 def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
   let summary = "Specialize a pipeline for values of its constants";
   let description = [{
-    **Requires** the authored level, behind `piko-apply-precision`: what is folded
-    is rounded.
+    **Requires** the authored level, after `piko-apply-precision`: what is folded is
+    rounded.
 
-    **Does**: `values` has the form `settings.shadows=0`, `weights.value[2]=0.5`
-    (of an array), `albedo=0.5` (a constant that is a number) or `lights.size=1`
-    (how many elements a buffer has). The value takes the place of each load of
-    the field and of each `piko.extent` of the buffer, and a `piko.fixed` has the
-    runtime test, before each run, that the host's value is the same.
+    **Does**: specialization. `values` has the form `settings.shadows=0`,
+    `weights.value[2]=0.5` (of an array), `albedo=0.5` (of a constant that is a number)
+    or `lights.size=1` (how many elements a buffer has). The value replaces each load of
+    the field, or each `piko.extent` of the buffer. A `piko.fixed` has the runtime test,
+    before each run, that the host's value is the same. Canonicalization and
+    `piko-prune` erase what is unnecessary then.
 
-    **Guarantees** that results are those of the general pipeline, or a run is an
-    error that names the constant. What the value makes unnecessary goes by
-    canonicalization and `piko-prune`.
+    **Guarantees** the results of the general pipeline, or an error of the run that
+    names the constant.
 
     Before:
     ```
@@ -38,9 +38,9 @@ def FixConstants : Pass<"piko-fix-constants", "::piko::PipelineOp"> {
       %shadows = arith.constant 0 : i32
     ```
 
-    **Limits**: an element that is indexed by what is not constant is loaded all
-    the same, and so is a number that an index is computed from, which is tested
-    when the pipeline runs. Elements of buffers are not fixed.
+    **Limits**: elements at an index that is not constant are loaded all the same; so is
+    a number that an index is computed from, which is tested at run time. Elements of
+    buffers are not fixed.
   }];
   let options = [
     ListOption<"values", "values", "std::string",
@@ -54,17 +54,16 @@ def SetDirectives : Pass<"piko-set-directives", "::piko::PipelineOp"> {
     **Requires** the authored level, with stages as they are written.
 
     **Does**: sets, for each `stage:key=value` of `set`, a directive of the stage of
-    that name, in C++ or in the dialect, in the place of what it says itself:
+    that name, in C++ or in the dialect. It replaces what the stage says itself.
 
-    * `schedule`: `load_balance`, `direct_map`, `serialize`, `all`, or `none`, as if
-      the stage said nothing;
+    * `schedule`: `load_balance`, `direct_map`, `serialize`, `all`, or `none`;
     * `split`: how many primitives `all` gives a core at a time;
     * `lanes`: `items`, `iterations`, `collapsed`, `one`, or `none`;
     * `precision`: `strict`, `contracted` or `relaxed`.
 
-    **Guarantees** the results of the pipeline as it was, but for the last bits of
-    what stages compute whose `precision` is set: `end_stage`, `end_bin`, `batch`,
-    `every_bin` and `unordered` stay as they are.
+    **Guarantees** the same results, but for the last bits of what stages compute whose
+    `precision` is set: `end_stage`, `end_bin`, `batch`, `every_bin` and `unordered`
+    stay as they are.
 
     Before, with `set=shade:schedule=direct_map,shade:precision=contracted`:
     ```
@@ -79,9 +78,9 @@ def SetDirectives : Pass<"piko-set-directives", "::piko::PipelineOp"> {
       piko.process precision contracted {
     ```
 
-    **Limits**: a schedule with a dynamic body says where bins run when the pipeline
-    does, and is refused; so is `none` where a schedule says what a stage waits for.
-    Lanes that a stage cannot have are refused by `piko-map-lanes`.
+    **Limits**: a schedule with a dynamic body is refused; so is `none` where a schedule
+    says more than where bins run, and `split` where it is not `all`. Lanes that a stage
+    cannot have are refused by `piko-map-lanes`.
   }];
   let options = [
     ListOption<"directives", "set", "std::string",
@@ -91,12 +90,12 @@ def SetDirectives : Pass<"piko-set-directives", "::piko::PipelineOp"> {
 def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
   let summary = "Drop edges on which nothing goes, and what they alone feed";
   let description = [{
-    **Requires** the authored level with stages in order (`piko-order-stages`):
-    their order, and what may not wait, follow from all edges of the text.
+    **Requires** the authored level with stages in order (`piko-order-stages`): their
+    order, and what may not wait, follow from all edges of the text.
 
-    **Does**: a port on which no operation of the process phase emits, because a
-    constant or a template argument says so, goes with its edge; so does each
-    stage that no primitive can reach from a source.
+    **Does**: erases each port on which no operation of the process phase emits, because
+    a constant or a template argument says so, with its edge. Then it erases each stage
+    that no primitive can reach from a source, with a remark.
 
     **Guarantees** the same results, and the same order of what is left.
 
@@ -115,10 +114,11 @@ def PruneUnreached : Pass<"piko-prune-unreached", "::piko::PipelineOp"> {
       ... piko.emit 0 (%color) : f32
     ```
 
-    **Limits**: a stage that runs for empty bins, or that one which is reached
-    waits for, stays, with an edge that leads there. So does a cycle on which a
-    stage that is reached collects, because its rounds can be seen; and all that
-    is fed only behind a condition which never holds, but is not constant.
+    **Limits**: a stage that runs for empty bins, has a dynamic schedule, or is waited
+    for by one that is reached, stays, with an edge that leads there. So does a cycle on
+    which a stage that is reached collects, because its rounds can be seen. What is fed
+    only under a condition that never holds, but is not constant, stays. A pipeline that
+    is checked (`piko-add-checks`) stays whole.
   }];
 }
 
@@ -127,17 +127,13 @@ def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
   let description = [{
     **Requires** the authored level with stages in order (`piko-order-stages`).
 
-    **Does**: finds what state, and errors that a stage can end with, depend on,
-    over all of the graph at once, so that a field or a stage that only feeds
-    itself around a cycle is not among it. All else is erased: computations in
-    the phases, stages, and the ports that fed them. Each stage that no source
-    feeds gets a record of its own with the fields it needs, without room
-    between them; what its producers emit shrinks with it. `carried` of each
-    edge is the size of its primitives before. A stage that waits for one that
-    is removed waits for those that this one came after.
+    **Does**: dead code elimination over the whole graph. It finds what state, and
+    errors of a run, depend on, also around cycles. It erases the rest: computations,
+    stages and the ports that fed them. Stages that no source feeds get packed records
+    of the fields they need; `carried` of an edge keeps the old size. A stage that
+    waited for an erased one waits for those before it.
 
-    **Guarantees** that state, the order in which it changes, and the sources
-    stay as they are.
+    **Guarantees** that state, the order in which it changes, and the sources stay.
 
     Before, where `@keep` does not read `"y"`:
     ```
@@ -153,12 +149,10 @@ def Prune : Pass<"piko-prune", "::mlir::ModuleOp"> {
     piko.stage @move ... : @F -> [@F.keep] { ... piko.emit 0 (%x) : f32 ... }
     ```
 
-    **Limits**: an array is needed as a whole or not at all. A stage may end with
-    an error, and is kept, if it is on a cycle, has a dynamic schedule or a
-    barrier, or assigns to a bin that no test of `piko.bin_at` has found to be
-    inside. A stage that a source feeds is emptied, not removed. An access to
-    state that only erased work needs is not made, so it cannot fail; a pipeline
-    that is checked (`piko-add-checks`) is left as it is.
+    **Limits**: an array is needed as a whole. A stage that may end with an error stays:
+    on a cycle, with a dynamic schedule or barrier, or assigning to a bin that may be
+    outside. Erased accesses cannot fail any more. A stage without effect that a source
+    feeds is emptied.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::ub::UBDialect"];

@@ -27,7 +27,7 @@ llvm::LogicalResult storeArguments(mlir::OpBuilder &builder,
                                    mlir::ValueRange arguments,
                                    mlir::Value words);
 
-/// Writes the arguments to memory in front of the launch; fails with an error
+/// Writes the arguments to memory before the launch; fails with an error
 /// for a grid of several dimensions or an argument that is not a number.
 llvm::FailureOr<LaunchCall> createLaunchCall(mlir::gpu::LaunchFuncOp launch);
 

@@ -88,7 +88,7 @@ ArgumentWriter::ArgumentWriter(gpu::LaunchFuncOp launch, StringRef name)
 /// Whether a function of the runtime's answers the same before a run and in it.
 static bool saysWhatTheHostHas(StringRef name) {
   return llvm::is_contained({"pikoir_get_state", "pikoir_get_source",
-                             "pikoir_domain", "pikoir_grid", "pikoir_cell_grid",
+                             "pikoir_domain", "pikoir_grid", "pikoir_tile_grid",
                              "pikoir_loop_limit"},
                             name);
 }

@@ -42,8 +42,8 @@ static bool isInSharedMemory(Value pointer) {
          unsigned(NVVM::NVVMMemorySpace::Shared);
 }
 
-/// Says of access to a block's memory what memref cannot. Of a load that is not
-/// to be kept, LLVM has to know that it cannot go in front of its loop; and
+/// Says of access to a block's shared memory what memref cannot. Of a load that
+/// is not to be kept, LLVM has to know that it cannot go before its loop; and
 /// ptxas, how many registers that is for.
 static void finishBlockMemory(Operation *op) {
   if (auto atomic = dyn_cast<LLVM::AtomicRMWOp>(op);

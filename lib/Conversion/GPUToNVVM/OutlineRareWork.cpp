@@ -4,7 +4,7 @@
 // as rare,
 //   1. make a function of it, which gets by value what the loop uses, but for
 //      what it can compute as well from constants and the thread's number;
-//   2. pass the kernel's own parameters in the block's memory: as arguments
+//   2. pass the kernel's own parameters in shared memory: as arguments
 //      they would all need registers at once, and drive others to the stack;
 //   3. move private arrays there that only the loop uses; of others it has a
 //      copy, which comes back as results, so that the kernel's own stay in
@@ -53,7 +53,7 @@ private:
   void sortCaptures();
   void sortCapture(Value capture);
   bool canRepeat(Value value, int depth = 0);
-  /// The parameters, by way of the block's memory.
+  /// The parameters, by way of shared memory.
   void passParameters(OpBuilder &caller);
   void takeParameters(OpBuilder &builder, Value memory, IRMapping &mapping);
   func::FuncOp createFunction();

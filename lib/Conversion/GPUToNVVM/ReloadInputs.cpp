@@ -5,7 +5,7 @@
 // for a unit, a cell or a primitive. So for each use,
 //   1. go from it to the outermost loop in whose body no other loop waits: what
 //   is
-//      loaded in front of that is kept over none that does not need it;
+//      loaded before that is kept over none that does not need it;
 //   2. load the member again there, from an address that LLVM does not know to
 //   be
 //      the same, or it would put the load back.

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-spill-to-block: numbers that are alive over an innermost loop, and that
-// it needs under a condition or not at all, are in the block's memory. For each
+// it needs under a condition or not at all, are in shared memory. For each
 // such loop of a kernel
 //   1. count the registers of what is alive over it: if there are few, all
 //      stays as it is;
-//   2. a number that each of its turns needs stays in a register;
+//   2. a number that each of its iterations needs stays in a register;
 //   3. any other is stored where it is known, at a place of the thread's, and
-//      loaded where it is used inside of the loop, or behind it. The load is
-//      not to be moved: in front of the loop it would take a register again.
+//      loaded where it is used inside of the loop, or after it. The load is
+//      not to be moved: before the loop it would take a register again.
 // So ptxas has nothing to spill to the thread's own memory, where a spill is
 // several times as slow, and the choice is by how often a number is needed.
 
@@ -55,7 +55,7 @@ private:
   void collect();
   bool isSpillable(Value value) const;
   bool isHot(Value value) const;
-  bool isBehind(OpOperand &use, Operation *around) const;
+  bool isAfter(OpOperand &use, Operation *around) const;
   Operation *findAround(Value value) const;
   void spill(Value value);
 
@@ -88,16 +88,16 @@ Operation *Spiller::findAround(Value value) const {
   return around;
 }
 
-/// Whether the number has to outlive the loop, or some of its turns, to be used
-/// there.
-bool Spiller::isBehind(OpOperand &use, Operation *around) const {
+/// Whether the number has to outlive the loop, or some of its iterations, to be
+/// used there.
+bool Spiller::isAfter(OpOperand &use, Operation *around) const {
   Operation *user = around->getBlock()->findAncestorOpInBlock(*use.getOwner());
   if (user == use.getOwner() && user == around)
     return false; // what a loop begins with
   return user == around || around->isBeforeInBlock(user);
 }
 
-/// Whether each turn of the loop uses it.
+/// Whether each iteration of the loop uses it.
 bool Spiller::isHot(Value value) const {
   return llvm::any_of(value.getUses(), [&](OpOperand &use) {
     Operation *user = use.getOwner();
@@ -132,7 +132,7 @@ void Spiller::repeatCasts() {
   for (Operation *cast : llvm::reverse(casts)) {
     Operation *around = findAround(cast->getResult(0));
     for (OpOperand &use : llvm::make_early_inc_range(cast->getUses()))
-      if (isBehind(use, around) && !isHot(cast->getResult(0))) {
+      if (isAfter(use, around) && !isHot(cast->getResult(0))) {
         OpBuilder builder(use.getOwner());
         use.set(builder.clone(*cast)->getResult(0));
       }
@@ -148,7 +148,7 @@ void Spiller::collect() {
       return;
     if (Operation *around = findAround(value);
         around && llvm::any_of(value.getUses(), [&](OpOperand &use) {
-          return isBehind(use, around);
+          return isAfter(use, around);
         }))
       alive.insert(value);
   };
@@ -187,7 +187,7 @@ void Spiller::spill(Value value) {
       MemRefType::get(threads, type, MemRefLayoutAttrInterface(), space), loc);
   llvm::MapVector<Block *, SmallVector<OpOperand *>> blocks;
   for (OpOperand &use : value.getUses())
-    if (isBehind(use, around))
+    if (isAfter(use, around))
       blocks[use.getOwner()->getBlock()].push_back(&use);
   auto thread = [](OpBuilder &at, Location loc) -> Value {
     return gpu::ThreadIdOp::create(at, loc, gpu::Dimension::x);
@@ -232,7 +232,7 @@ void Spiller::run(int64_t mostRegisters, int64_t &bytesLeft) {
 }
 
 /// Whether registers are bounded for it: it calls a function, or loads numbers
-/// again that are in the block's memory.
+/// again that are in shared memory.
 static bool isBounded(gpu::GPUFuncOp kernel) {
   return kernel->hasAttr(NVVM::NVVMDialect::getMaxnregAttrName()) ||
          kernel

@@ -2,13 +2,15 @@
 //
 // Parallel loops whose iterations are threads of a block:
 //   1. what lies between barriers is done by the threads that have an
-//   iteration,
-//      behind a test; what lives across a barrier stays in their registers;
+//      iteration, under a test; what lives across a barrier stays in their
+//      registers;
 //   2. a barrier is the block's;
 //   3. control flow around barriers is taken by all threads of the block: what
 //      decides about it is iteration 0's, which others compare theirs with
 //      where it may differ;
-//   4. reductions, scans and sorts are done by all, in the block's memory.
+//   4. reductions, scans and sorts are done by all, in shared memory. A
+//      reduction takes log2(threads) steps, a scan twice as many. In a sort
+//      each thread counts the keys that come before its own.
 
 #include "PikoToGPU/PikoToGPU.h"
 
@@ -42,7 +44,7 @@ private:
   LogicalResult mapBarrier(Operation *op);
   LogicalResult mapFor(scf::ForOp op);
   void mapWhile(scf::WhileOp op, StringRef barrierName);
-  /// Puts operations behind a test of whether the thread runs an iteration.
+  /// Puts operations under a test of whether the thread runs an iteration.
   LogicalResult guard(ArrayRef<Operation *> run);
   /// Iteration 0's value, where `builder` stands. The barrier is the one that
   /// an iteration with another value would miss.
@@ -54,7 +56,7 @@ private:
   /// For each distance 1, 2, 4, ..., or the other way round.
   void forEachDistance(bool falls, llvm::function_ref<void(Value)> body);
   /// For each distance s, in the iterations that are a multiple of 2s and have
-  /// one so far behind them, whose number `body` gets.
+  /// one so far after them, whose number `body` gets.
   void forEachPair(llvm::function_ref<void(Value)> body);
   SmallVector<Value> shareValues(ValueRange values);
 
@@ -82,7 +84,7 @@ private:
 //===----------------------------------------------------------------------===//
 
 /// What may be done without an iteration: it has no effect on anything, and
-/// reads no primitive, of which there may be none so far behind.
+/// reads no primitive, of which there may be none so far on.
 static bool isFree(Operation *op) {
   return op->getNumRegions() == 0 && isMemoryEffectFree(op) &&
          isSpeculatable(op) && !isa<GetOp, ItemOp>(op);
@@ -217,7 +219,7 @@ LogicalResult IterationMapper::mapBarrier(Operation *op) {
 Value IterationMapper::agree(Value value, StringRef barrierName) {
   if (!loop->isAncestor(value.getParentBlock()->getParentOp()))
     return value;
-  Value cell = addBlockMemory(launch, 1, value.getType());
+  Value cell = addSharedMemory(launch, 1, value.getType());
   Value zero = index(0);
   when(compare(P::eq, thread, zero), [&] { store(value, cell, zero); });
   barrier();
@@ -228,7 +230,7 @@ Value IterationMapper::agree(Value value, StringRef barrierName) {
   return first;
 }
 
-/// What comes behind such a barrier has no meaning, and is left out.
+/// What comes after such a barrier has no meaning, and is left out.
 void IterationMapper::checkAgreement(Value value, Value first,
                                      StringRef barrierName) {
   Value zero = index(0);
@@ -307,7 +309,7 @@ void IterationMapper::mapWhile(scf::WhileOp op, StringRef barrierName) {
 SmallVector<Value> IterationMapper::shareValues(ValueRange values) {
   int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
   SmallVector<Value> arrays = llvm::map_to_vector(values, [&](Value value) {
-    return addBlockMemory(launch, threads, value.getType());
+    return addSharedMemory(launch, threads, value.getType());
   });
   when(isActive(), [&] {
     for (auto [value, array] : llvm::zip(values, arrays))
@@ -342,7 +344,7 @@ void IterationMapper::forEachPair(llvm::function_ref<void(Value)> body) {
 }
 
 /// In the order of the language: at distance s, each multiple of 2s that has
-/// another value so far behind.
+/// another value so far on.
 void IterationMapper::reduce(ReduceOp op) {
   SmallVector<Value> arrays = shareValues(op.getValues());
   Block &body = op.getBody().front();
@@ -392,7 +394,7 @@ void IterationMapper::scan(ScanOp op) {
 void IterationMapper::sort(SortOp op) {
   Value keys = shareValues(op.getKey()).front(), mine = op.getKey();
   int64_t threads = *getConstantIntValue(launch.getBlockSizeX());
-  Value ranks = addBlockMemory(launch, threads, builder.getIndexType());
+  Value ranks = addSharedMemory(launch, threads, builder.getIndexType());
   when(isActive(), [&] {
     auto others = scf::ForOp::create(builder, loc, index(0), count, index(1),
                                      ValueRange{index(0)});
@@ -432,7 +434,7 @@ LogicalResult IterationMapper::run() {
     made.ownArrays.insert(own);
     active = own;
   }
-  stopped = addBlockMemory(launch, 1, builder.getI1Type());
+  stopped = addSharedMemory(launch, 1, builder.getI1Type());
   Value zero = index(0), runs = compare(P::slt, thread, count);
   store(runs, active, zero);
   when(compare(P::eq, thread, zero),

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Counters of loops that all threads of a block run alike: over its units, and
-// over the cells of one. Each would take two registers of every thread for as
+// over the buckets of one. Each would take two registers of every thread for as
 // long as the loop runs, and with it what follows from it: addresses, the end
 // of the loop. So
-//   1. the counter is in the block's memory, and one thread counts it on
+//   1. the counter is in shared memory, and one thread counts it on
 //   between
 //      two barriers;
-//   2. each use loads it again, which LLVM may not do in front of a loop.
-// So is what a loop over groups of primitives needs of the cell: each thread
+//   2. each use loads it again, which LLVM may not do before a loop.
+// So is what a loop over groups of primitives needs of the bucket: each thread
 // writes it, the same as others, and reads what it has written.
 
 #include "PikoToGPU/CollapsedPixels.h"
@@ -47,9 +47,9 @@ void piko::loadForUses(Value number, Operation *loop, Value memory,
 void piko::countInBlock(scf::ForOp loop, gpu::LaunchOp launch,
                         llvm::function_ref<Value(OpBuilder &)> createEnd) {
   Emitter b(loop.getLoc(), loop);
-  Value counter = addBlockMemory(launch, 1, b.getIndexType()), step;
+  Value counter = addSharedMemory(launch, 1, b.getIndexType()), step;
   if (!isConstantIntValue(loop.getStep(), 1)) {
-    step = addBlockMemory(launch, 1, b.getIndexType());
+    step = addSharedMemory(launch, 1, b.getIndexType());
     b.store(loop.getStep(), step, b.index(0));
   }
   auto setByOne = [&](Emitter &at, llvm::function_ref<Value(Emitter &)> value) {
@@ -83,15 +83,15 @@ void piko::countInBlock(scf::ForOp loop, gpu::LaunchOp launch,
   loop.erase();
 }
 
-void piko::countCellsInBlock(scf::ForOp units, gpu::LaunchOp launch) {
-  SmallVector<scf::ForOp> cells;
+void piko::countBucketsInBlock(scf::ForOp units, gpu::LaunchOp launch) {
+  SmallVector<scf::ForOp> buckets;
   for (auto loop : units.getBody()->getOps<scf::ForOp>())
-    if (loop.getUpperBound().getDefiningOp<UnitCellsOp>())
-      cells.push_back(loop);
-  for (scf::ForOp loop : cells) {
-    auto of = loop.getUpperBound().getDefiningOp<UnitCellsOp>();
+    if (loop.getUpperBound().getDefiningOp<UnitBucketsOp>())
+      buckets.push_back(loop);
+  for (scf::ForOp loop : buckets) {
+    auto of = loop.getUpperBound().getDefiningOp<UnitBucketsOp>();
     countInBlock(loop, launch, [&](OpBuilder &builder) {
-      return cast<UnitCellsOp>(builder.clone(*of)).getEnd();
+      return cast<UnitBucketsOp>(builder.clone(*of)).getEnd();
     });
   }
 }
@@ -127,7 +127,7 @@ void piko::keepInBlock(scf::WhileOp loop, gpu::LaunchOp launch) {
         value.getType().isInteger(1) || isOfThread(value, launch))
       continue;
     Emitter b(loop.getLoc(), loop);
-    Value memory = addBlockMemory(launch, 1, value.getType());
+    Value memory = addSharedMemory(launch, 1, value.getType());
     loadForUses(value, loop, memory);
     b.store(value, memory, b.index(0));
   }

@@ -3,18 +3,19 @@
 // What the threads of a block do. All of them go the same way through a block's
 // work, but for the bodies of loops that they share:
 //   1. what lies between shared loops and has effects is the first thread's,
-//      between two barriers; numbers from there that others need go through the
-//      block's memory;
+//      between two barriers; numbers from there that others need go through
+//      shared memory;
 //   2. a shared loop steps by the number of threads, between two barriers; one
 //      over primitives that the first thread does in order is cut into rounds;
 //   3. iterations that meet at barriers are threads (BarrierLoops.cpp);
-//   4. arrays that more than one thread sees are in the block's memory.
-// What threads emit is in their outboxes; the block takes it (a flush) behind
-// each round of a loop, so that it is in the order of iterations, and no join
-// has to follow more than a round's by one thread. What iterations of a cut
-// loop emit is in outboxes of their own until its end.
+//   4. arrays that more than one thread sees are in shared memory.
+// What threads emit is in their append buffers; the block takes it (a flush)
+// after each round of a loop, so that it is in the order of iterations, and no
+// join has to follow more than a round's by one thread. What iterations of a
+// cut loop emit is in append buffers of their own until its end.
 //
-// One class, and so one file: all four share the block's cells and barriers.
+// One class, and so one file: all four share the variables in shared memory and
+// the barriers.
 
 #include "PikoToGPU/PikoToGPU.h"
 
@@ -36,7 +37,7 @@ public:
   explicit BlockMapper(GridMemory &memory)
       : launch(memory.launch), log(memory.log), memory(memory),
         loc(memory.launch.getLoc()) {
-    threads.ownArrays.insert(memory.outboxes.getDefiningOp());
+    threads.ownArrays.insert(memory.buffers.getDefiningOp());
   }
   LogicalResult run();
 
@@ -52,16 +53,16 @@ private:
   void doInRounds(scf::ForOp loop);
   LogicalResult mapLocalBin(LocalBinOp local);
   void clearStates(OpBuilder &builder, Value words);
-  void deferIterations(DeferBeginOp begin);
-  void defer(DeferIterationOp iteration, Value states, Value has);
-  void endDeferral(DeferEndOp end);
-  /// Copies the outboxes of a thread, or of an iteration, whose words begin at
-  /// `at`.
-  void copyOutboxes(OpBuilder &builder, Value from, Value fromAt, Value to,
-                    Value toAt);
+  void reorderIterations(ReorderBeginOp begin);
+  void reorder(ReorderIterationOp iteration, Value states, Value has);
+  void endReordering(ReorderEndOp end);
+  /// Copies the append buffers of a thread, or of an iteration, whose words
+  /// begin at `at`.
+  void copyAppendBuffers(OpBuilder &builder, Value from, Value fromAt, Value to,
+                         Value toAt);
   Value createOwn(MemRefType type);
   void mapScratch(ScratchOp scratch);
-  FailureOr<Value> broadcast(Value value, OpBuilder &inside, OpBuilder &behind);
+  FailureOr<Value> broadcast(Value value, OpBuilder &inside, OpBuilder &after);
   LogicalResult placeArrays();
   /// An array of the block, where the body begins.
   Value createBlockArray(memref::AllocaOp array);
@@ -77,7 +78,7 @@ private:
     firsts.insert(first);
     return first;
   }
-  Value addCell(Type type) { return addBlockMemory(launch, 1, type); }
+  Value addVariable(Type type) { return addSharedMemory(launch, 1, type); }
 
   gpu::LaunchOp launch;
   Value log;
@@ -86,22 +87,23 @@ private:
   llvm::DenseSet<Operation *> firsts;
   ThreadOperations threads; ///< What threads have of their own.
   int64_t blockBytes = 0;
-  /// Of the loop whose emissions are deferred: outboxes of its iterations, how
-  /// many, whether there is memory for them, and where a thread's own wait.
+  /// Of the loop whose emissions are reordered: append buffers of its
+  /// iterations, how many, whether there is memory for them, and where a
+  /// thread's own wait.
   Value states, iterations, hasStates, own;
 };
 
 } // namespace
 
-/// What adds to an outbox.
+/// What adds to an append buffer.
 static bool isEmission(Operation *op) {
   return isa<AppendOp, AppendBinOp, NextOp>(op) || op->hasTrait<Failure>();
 }
 
 /// What all threads take part in.
 static bool isShared(Operation *op) {
-  return isa<ScratchOp, DeferBeginOp, DeferEndOp, LocalBinOp, ParallelForOp>(
-             op) ||
+  return isa<ScratchOp, ReorderBeginOp, ReorderEndOp, LocalBinOp,
+             ParallelForOp>(op) ||
          op->hasAttr(marks::shared);
 }
 
@@ -118,7 +120,7 @@ static bool onlyReads(Operation *op) {
 
 /// What a thread has of its own.
 static bool isLocalArray(Operation *op) {
-  return isa<memref::AllocaOp, OutboxesOp>(op);
+  return isa<memref::AllocaOp, AppendBuffersOp>(op);
 }
 
 //===----------------------------------------------------------------------===//
@@ -132,7 +134,7 @@ static int64_t getByteSize(Type type) {
 }
 
 FailureOr<Value> BlockMapper::broadcast(Value value, OpBuilder &inside,
-                                        OpBuilder &behind) {
+                                        OpBuilder &after) {
   Type type = value.getType();
   bool isPrim = isa<PrimType>(type);
   if (!isPrim && !type.isIntOrIndexOrFloat())
@@ -143,13 +145,13 @@ FailureOr<Value> BlockMapper::broadcast(Value value, OpBuilder &inside,
   Value sent = value;
   if (isPrim)
     sent = ToAddressOp::create(inside, value.getLoc(), value);
-  Value cell = addCell(sent.getType());
+  Value variable = addVariable(sent.getType());
   blockBytes += getByteSize(sent.getType());
-  memref::StoreOp::create(inside, loc, sent, cell, constant(inside, 0));
+  memref::StoreOp::create(inside, loc, sent, variable, constant(inside, 0));
   Value received =
-      memref::LoadOp::create(behind, loc, cell, constant(behind, 0));
+      memref::LoadOp::create(after, loc, variable, constant(after, 0));
   if (isPrim)
-    received = FromAddressOp::create(behind, value.getLoc(), type, received);
+    received = FromAddressOp::create(after, value.getLoc(), type, received);
   return received;
 }
 
@@ -249,12 +251,12 @@ LogicalResult BlockMapper::mapOperation(Operation *op) {
     mapScratch(scratch);
     return success();
   }
-  if (auto begin = dyn_cast<DeferBeginOp>(op)) {
-    deferIterations(begin);
+  if (auto begin = dyn_cast<ReorderBeginOp>(op)) {
+    reorderIterations(begin);
     return success();
   }
-  if (auto end = dyn_cast<DeferEndOp>(op)) {
-    endDeferral(end);
+  if (auto end = dyn_cast<ReorderEndOp>(op)) {
+    endReordering(end);
     return success();
   }
   if (auto local = dyn_cast<LocalBinOp>(op))
@@ -300,7 +302,7 @@ void BlockMapper::shareInRounds(scf::ForOp loop) {
   memory.flush(builder);
   if (memory.rare && memory.rare->loop == loop) {
     memory.rare->rounds = rounds;
-    memory.rare->turn = ifOp;
+    memory.rare->iteration = ifOp;
   }
   if (auto found = memory.queues.find(loop); found != memory.queues.end()) {
     Value next = arith::AddIOp::create(builder, loc, rounds.getInductionVar(),
@@ -316,7 +318,7 @@ void BlockMapper::shareInRounds(scf::ForOp loop) {
 }
 
 /// Whether the first thread does a loop in rounds: what it uses of those before
-/// can go through the block's memory.
+/// can go through shared memory.
 bool BlockMapper::isCut(Operation *op) const {
   if (!memory.ordered.contains(op) || op->getNumResults() > 0 ||
       !contains(op, isEmission) || contains(op, isShared))
@@ -367,7 +369,7 @@ void BlockMapper::share(scf::ForOp loop) {
   builder.setInsertionPointAfter(loop);
   gpu::BarrierOp::create(builder, loc);
   if (memory.queues.contains(loop) ||
-      (!loop->removeAttr(marks::deferred) && contains(loop, isEmission)))
+      (!loop->removeAttr(marks::reordered) && contains(loop, isEmission)))
     return shareInRounds(loop);
   threads.ofOne.insert(loop);
   builder.setInsertionPoint(loop);
@@ -392,7 +394,7 @@ LogicalResult BlockMapper::mapIterations(ParallelForOp loop) {
   return success();
 }
 
-/// The block takes what is read there, and forgets it behind its last reader.
+/// The block takes what is read there, and forgets it after its last reader.
 LogicalResult BlockMapper::mapLocalBin(LocalBinOp local) {
   OpBuilder builder(local);
   memory.flush(builder);
@@ -421,8 +423,8 @@ Value BlockMapper::createOwn(MemRefType type) {
   return array;
 }
 
-void BlockMapper::copyOutboxes(OpBuilder &builder, Value from, Value fromAt,
-                               Value to, Value toAt) {
+void BlockMapper::copyAppendBuffers(OpBuilder &builder, Value from,
+                                    Value fromAt, Value to, Value toAt) {
   for (int64_t i = 0, e = memory.getWords(); i < e; ++i) {
     auto place = [&](Value at) -> Value {
       Value which = constant(builder, i);
@@ -434,8 +436,8 @@ void BlockMapper::copyOutboxes(OpBuilder &builder, Value from, Value fromAt,
   }
 }
 
-/// All threads of the block make the outboxes of iterations empty, as what the
-/// log gives holds what was there.
+/// All threads of the block make the append buffers of iterations empty, as
+/// what the log gives holds what was there.
 void BlockMapper::clearStates(OpBuilder &builder, Value words) {
   OpBuilder then =
       scf::IfOp::create(builder, loc, hasStates).getThenBodyBuilder();
@@ -447,21 +449,21 @@ void BlockMapper::clearStates(OpBuilder &builder, Value words) {
   gpu::BarrierOp::create(builder, loc);
 }
 
-void BlockMapper::deferIterations(DeferBeginOp begin) {
+void BlockMapper::reorderIterations(ReorderBeginOp begin) {
   OpBuilder builder(begin);
   iterations = begin.getIterations();
   memory.flush(builder);
   Value bytes = arith::MulIOp::create(builder, loc, iterations,
                                       constant(builder, 8 * memory.getWords()));
-  Value cell = addCell(builder.getIndexType());
+  Value variable = addVariable(builder.getIndexType());
   scf::IfOp first = createFirst(builder);
   OpBuilder inside = first.getThenBodyBuilder();
   Value taken =
       AllocateOp::create(inside, loc, inside.getIndexType(), log, bytes);
-  memref::StoreOp::create(inside, loc, taken, cell, constant(inside, 0));
+  memref::StoreOp::create(inside, loc, taken, variable, constant(inside, 0));
   gpu::BarrierOp::create(builder, loc);
   Value zero = constant(builder, 0);
-  Value address = memref::LoadOp::create(builder, loc, cell, zero);
+  Value address = memref::LoadOp::create(builder, loc, variable, zero);
   hasStates = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne,
                                     address, zero);
   auto plain = MemRefType::get({ShapedType::kDynamic}, builder.getI8Type());
@@ -472,36 +474,38 @@ void BlockMapper::deferIterations(DeferBeginOp begin) {
   states = memref::ViewOp::create(builder, loc, type, all, zero, words);
   clearStates(builder, words);
   own = createOwn(MemRefType::get({memory.getWords()}, builder.getI64Type()));
-  SmallVector<DeferIterationOp> deferred;
-  for (Operation *op = begin; op && !isa<DeferEndOp>(op);
+  SmallVector<ReorderIterationOp> reordered;
+  for (Operation *op = begin; op && !isa<ReorderEndOp>(op);
        op = op->getNextNode())
     op->walk(
-        [&](DeferIterationOp iteration) { deferred.push_back(iteration); });
-  for (DeferIterationOp iteration : deferred)
-    defer(iteration, states, hasStates);
+        [&](ReorderIterationOp iteration) { reordered.push_back(iteration); });
+  for (ReorderIterationOp iteration : reordered)
+    reorder(iteration, states, hasStates);
   begin.erase();
 }
 
-/// From here to the end of its body a loop's iteration has its own outboxes.
-void BlockMapper::defer(DeferIterationOp iteration, Value states, Value has) {
-  iteration->getParentOp()->setAttr(marks::deferred,
+/// From here to the end of its body a loop's iteration has its own append
+/// buffers.
+void BlockMapper::reorder(ReorderIterationOp iteration, Value states,
+                          Value has) {
+  iteration->getParentOp()->setAttr(marks::reordered,
                                     UnitAttr::get(launch.getContext()));
   OpBuilder builder(iteration);
   Value at = arith::MulIOp::create(builder, loc, iteration.getIteration(),
                                    constant(builder, memory.getWords()));
   OpBuilder inside = scf::IfOp::create(builder, loc, has).getThenBodyBuilder();
-  copyOutboxes(inside, memory.outboxes, {}, own, {});
-  copyOutboxes(inside, states, at, memory.outboxes, {});
+  copyAppendBuffers(inside, memory.buffers, {}, own, {});
+  copyAppendBuffers(inside, states, at, memory.buffers, {});
   builder.setInsertionPoint(iteration->getBlock()->getTerminator());
   inside = scf::IfOp::create(builder, loc, has).getThenBodyBuilder();
-  copyOutboxes(inside, memory.outboxes, {}, states, at);
-  copyOutboxes(inside, own, {}, memory.outboxes, {});
+  copyAppendBuffers(inside, memory.buffers, {}, states, at);
+  copyAppendBuffers(inside, own, {}, memory.buffers, {});
   iteration.erase();
 }
 
-void BlockMapper::endDeferral(DeferEndOp end) {
+void BlockMapper::endReordering(ReorderEndOp end) {
   OpBuilder builder(end);
-  copyOutboxes(builder, memory.outboxes, {}, own, {});
+  copyAppendBuffers(builder, memory.buffers, {}, own, {});
   auto rounds = scf::ForOp::create(builder, loc, constant(builder, 0),
                                    iterations, launch.getBlockSizeX());
   OpBuilder inside = OpBuilder::atBlockBegin(rounds.getBody());
@@ -514,10 +518,10 @@ void BlockMapper::endDeferral(DeferEndOp end) {
   OpBuilder then = ifOp.getThenBodyBuilder(), none = ifOp.getElseBodyBuilder();
   Value words =
       arith::MulIOp::create(then, loc, at, constant(then, memory.getWords()));
-  copyOutboxes(then, states, words, memory.outboxes, {});
-  memory.clearOutboxes(none);
+  copyAppendBuffers(then, states, words, memory.buffers, {});
+  memory.clearAppendBuffers(none);
   memory.flush(inside);
-  copyOutboxes(builder, own, {}, memory.outboxes, {});
+  copyAppendBuffers(builder, own, {}, memory.buffers, {});
   end.erase();
 }
 
@@ -528,8 +532,8 @@ void BlockMapper::endDeferral(DeferEndOp end) {
 /// The block keeps what it once has, for all that it does: it takes more where
 /// that is not enough.
 void BlockMapper::mapScratch(ScratchOp scratch) {
-  Value address = addCell(IndexType::get(launch.getContext())),
-        room = addCell(IndexType::get(launch.getContext()));
+  Value address = addVariable(IndexType::get(launch.getContext())),
+        room = addVariable(IndexType::get(launch.getContext()));
   blockBytes += 16;
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
   scf::IfOp init = createFirst(builder);
@@ -577,12 +581,12 @@ Value BlockMapper::createBlockArray(memref::AllocaOp array) {
     return isa<memref::LoadOp, memref::StoreOp, memref::AtomicRMWOp>(user);
   });
   if (isPlain && type.getLayout().isIdentity() &&
-      blockBytes + bytes <= maxBlockBytes / 2) {
+      blockBytes + bytes <= maxSharedBytes / 2) {
     blockBytes += bytes;
-    return addBlockMemory(launch, type.getShape(), type.getElementType());
+    return addSharedMemory(launch, type.getShape(), type.getElementType());
   }
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
-  Value address = addCell(builder.getIndexType());
+  Value address = addVariable(builder.getIndexType());
   blockBytes += 8;
   scf::IfOp first = createFirst(builder);
   OpBuilder inside = first.getThenBodyBuilder();

@@ -4,7 +4,7 @@
 // of a block share, where each primitive has a box of pixels and a test:
 //
 //   for each group of as many primitives as threads
-//     setup of mine: its box, and what pixels need, to the block's memory
+//     setup of mine: its box, and what pixels need, to shared memory
 //     barrier
 //     for my part of all (primitive, pixel of its box)
 //       if the test holds: set the primitive's bit in the pixel's mask, and
@@ -19,7 +19,7 @@
 // set by atomics whose order nobody can see.
 //
 // A primitive that takes a rare branch, or whose box is not in the bin, ends
-// its group in front of it. Then it is done alone, by all threads
+// its group before it. Then it is done alone, by all threads
 // (PixelSharing.cpp), out of line; and the first of them leaves what is left of
 // its unit to a launch of its own (RareLaunch.cpp), so that it decides about no
 // register of the others.
@@ -64,13 +64,14 @@ LogicalResult CollapsedPixels::split() {
 /// What is to be zero when a group begins is so from the start; each group
 /// leaves it as it was.
 void CollapsedPixels::clear() {
-  Emitter b(items.getLoc(), memory.cells.getParentBlock()->getTerminator());
+  Emitter b(items.getLoc(),
+            memory.flushWords.getParentBlock()->getTerminator());
   Operation *first = tile.place.back().getDefiningOp();
   b.setInsertionPointAfter(first);
   thread = b.cast(launch.getThreadIds().x, b.getI32Type());
   Type i32 = b.getI32Type();
   auto add = [&](int64_t size, Type type) {
-    return addBlockMemory(launch, size, type);
+    return addSharedMemory(launch, size, type);
   };
   ticket = add(1, i32), limit = add(1, i32), listed = add(1, i32);
   slots = add(group, i32), starts = add(group, i32);

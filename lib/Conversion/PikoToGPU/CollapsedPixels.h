@@ -11,12 +11,12 @@
 
 namespace piko {
 
-/// Where a kernel takes the primitives of a cell in groups, and comes to a rare
-/// one.
+/// Where a kernel takes the primitives of a bucket in groups, and comes to a
+/// rare one.
 struct RareSite {
   RestOp rest;            ///< What a launch before has left of the unit.
   mlir::Value isLeft;     ///< Whether that is something.
-  mlir::Value begin, end; ///< The cell's positions.
+  mlir::Value begin, end; ///< The bucket's positions.
   mlir::scf::WhileOp groups;
   mlir::scf::IfOp branch; ///< What is done with a rare primitive ...
   mlir::Value position;   ///< ... which is here,
@@ -31,13 +31,13 @@ llvm::FailureOr<RareSite> collapsePixels(mlir::scf::ForOp items,
                                          const ThreadTile &tile,
                                          GridMemory &memory);
 
-/// Puts a launch in front of the kernel's that leaves each unit to that where
+/// Puts a launch before the kernel's that leaves each unit to that where
 /// its first rare primitive stands. So what these need, which is called, takes
 /// no registers of the first one.
 void leaveRareToSecondLaunch(RareSite site, mlir::gpu::LaunchOp second);
 
 /// Puts what a loop that all threads run needs of what is around it, and is the
-/// same for all of them, into the block's memory, where each use finds it.
+/// same for all of them, into shared memory, where each use finds it.
 void keepInBlock(mlir::scf::WhileOp loop, mlir::gpu::LaunchOp launch);
 
 } // namespace piko

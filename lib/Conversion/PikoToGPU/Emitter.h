@@ -13,7 +13,7 @@
 
 namespace piko {
 
-/// Makes arithmetic on numbers of 32 bits, and access to the block's memory, as
+/// Makes arithmetic on numbers of 32 bits, and access to shared memory, as
 /// short as C++.
 struct Emitter : mlir::ImplicitLocOpBuilder {
   using mlir::ImplicitLocOpBuilder::ImplicitLocOpBuilder;
@@ -81,8 +81,8 @@ struct Emitter : mlir::ImplicitLocOpBuilder {
     return mlir::memref::LoadOp::create(*this, memory,
                                         mlir::ValueRange{toIndex(at)});
   }
-  /// The first element of a block's memory, which is not to be kept in
-  /// registers in front of a loop (GPUToNVVM.cpp).
+  /// The first element of a block's shared memory, which is not to be kept in
+  /// registers before a loop (GPUToNVVM.cpp).
   mlir::Value loadAgain(mlir::Value memory) {
     auto load =
         mlir::memref::LoadOp::create(*this, memory, mlir::ValueRange{index(0)});

@@ -68,8 +68,8 @@ void GridFormer::createUnits(StageOp stage, IntegerAttr source) {
 }
 
 /// Whether a join asks at which positions of a kernel primitives were emitted:
-/// for keys, or to permute them. The places of a loop and the cells of a source
-/// take positions, too.
+/// for keys, or to permute them. The places of a loop and the buckets of a
+/// source take positions, too.
 static bool needsPositions(KernelOp kernel) {
   ProgramOp program = getProgram(kernel->getParentOfType<PipelineOp>());
   if (getAssignedSource(kernel) || !program)
@@ -95,7 +95,7 @@ template <class OpT> static OpT findOnly(KernelOp kernel) {
   return found;
 }
 
-void piko::launchInFrontOf(KernelOp kernel, KernelOp first) {
+void piko::launchBefore(KernelOp kernel, KernelOp first) {
   auto bins = findOnly<OpenBinsOp>(kernel),
        ownBins = findOnly<OpenBinsOp>(first);
   auto log = findOnly<OpenLogOp>(kernel), ownLog = findOnly<OpenLogOp>(first);
@@ -107,13 +107,13 @@ void piko::launchInFrontOf(KernelOp kernel, KernelOp first) {
   ownBins.getBins().replaceAllUsesWith(bins.getBins());
   ownLog.getLog().replaceAllUsesWith(log.getLog());
   ownLog->erase();
-  Block::iterator behind = std::next(log->getIterator());
+  Block::iterator after = std::next(log->getIterator());
   Block &body = *launches.thenBlock();
-  log->getBlock()->getOperations().splice(behind, body.getOperations(),
+  log->getBlock()->getOperations().splice(after, body.getOperations(),
                                           body.begin(),
                                           body.getTerminator()->getIterator());
   launches->erase();
-  // Constants of the first may be in front of its bins.
+  // Constants of the first may be before its bins.
   Block &all = *first.getBodyBlock();
   ownBlocks.getBlocks().replaceAllUsesWith(blocks.getBlocks());
   ownBlocks->erase();
@@ -158,6 +158,6 @@ scf::ForOp piko::repeatForUnits(gpu::LaunchOp launch, Value bins,
       units.getBody()->begin(), body.getOperations(),
       std::next(opened->getIterator()), units->getIterator());
   builder.setInsertionPoint(units.getBody()->getTerminator());
-  gpu::BarrierOp::create(builder, loc); // the block's memory is used again
+  gpu::BarrierOp::create(builder, loc); // shared memory is used again
   return units;
 }

@@ -34,8 +34,8 @@ private:
 };
 
 /// Makes the launch of a kernel that precedes another one a launch of that one,
-/// in front of those that it has.
-void launchInFrontOf(KernelOp kernel, KernelOp first);
+/// before those that it has.
+void launchBefore(KernelOp kernel, KernelOp first);
 
 /// Positions end for those who ask where something was emitted.
 void dropEnds(KernelOp kernel, mlir::gpu::LaunchOp launch);
@@ -45,24 +45,23 @@ void dropEnds(KernelOp kernel, mlir::gpu::LaunchOp launch);
 mlir::scf::ForOp repeatForUnits(mlir::gpu::LaunchOp launch, mlir::Value bins,
                                 mlir::Operation *opened);
 
-/// Keeps the counter of a loop that all threads run alike in the block's
-/// memory. `createEnd` finds the loop's end again.
+/// Keeps the counter of a loop that all threads run alike in shared memory.
+/// `createEnd` finds the loop's end again.
 void countInBlock(mlir::scf::ForOp loop, mlir::gpu::LaunchOp launch,
                   llvm::function_ref<mlir::Value(mlir::OpBuilder &)> createEnd);
 
-/// Does so for the loops over the cells of units.
-void countCellsInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
+/// Does so for the loops over the buckets of units.
+void countBucketsInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
 /// Does so for the loop over units.
 void countUnitsInBlock(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch);
 
-/// Each use of a number in a loop gets a load of its own, of the block's
-/// memory.
+/// Each use of a number in a loop gets a load of its own, of shared memory.
 void loadForUses(mlir::Value number, mlir::Operation *loop, mlir::Value memory,
                  bool again = true);
 
 /// Lets the block take the units that a loop goes over from a counter of the
 /// log, whoever runs them. `inBlock`: the number of the one that it runs is
-/// kept in the block's memory.
+/// kept in shared memory.
 void takeUnits(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch,
                mlir::Value log, bool inBlock);
 /// Lets it do so from the counter of a kernel's second launch.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What a grid has for what its threads emit. The numbers of an outbox and of a
-// local edge are those of pikort/grid.h.
+// What a grid has for what its threads emit. The numbers of an append buffer
+// and of a local edge are those of pikort/grid.h.
 
 #include "PikoToGPU/PikoToGPU.h"
 
@@ -10,8 +10,8 @@
 using namespace mlir;
 using namespace piko;
 
-Value piko::addBlockMemory(gpu::LaunchOp launch, ArrayRef<int64_t> shape,
-                           Type type) {
+Value piko::addSharedMemory(gpu::LaunchOp launch, ArrayRef<int64_t> shape,
+                            Type type) {
   auto space = gpu::AddressSpaceAttr::get(
       launch.getContext(), gpu::GPUDialect::getWorkgroupAddressSpace());
   return launch.addWorkgroupAttribution(
@@ -20,7 +20,7 @@ Value piko::addBlockMemory(gpu::LaunchOp launch, ArrayRef<int64_t> shape,
 }
 
 int64_t GridMemory::getWords() {
-  return (int64_t(locals.size()) + 1) * PIKOIR_OUTBOX_WORDS;
+  return (int64_t(locals.size()) + 1) * PIKOIR_APPEND_WORDS;
 }
 
 int64_t GridMemory::getLocalBase(LocalBinOp local) {
@@ -34,36 +34,37 @@ int64_t GridMemory::getLocalBase(LocalBinOp local) {
 }
 
 void GridMemory::flush(OpBuilder &builder) {
-  FlushOp::create(builder, launch.getLoc(), log, launch.getBlockIds().x, cells);
+  FlushOp::create(builder, launch.getLoc(), log, launch.getBlockIds().x,
+                  flushWords);
 }
 
-void GridMemory::clearOutboxes(OpBuilder &builder) {
+void GridMemory::clearAppendBuffers(OpBuilder &builder) {
   Location loc = launch.getLoc();
   Value zero = arith::ConstantIntOp::create(builder, loc, 0, 64);
   for (int64_t i = 0, e = getWords(); i < e; ++i)
     memref::StoreOp::create(
-        builder, loc, zero, outboxes,
+        builder, loc, zero, buffers,
         arith::ConstantIndexOp::create(builder, loc, i).getResult());
 }
 
-void GridMemory::keepOutboxesInBlock(int64_t threads) {
+void GridMemory::keepAppendBuffersInBlock(int64_t threads) {
   Location loc = launch.getLoc();
   int64_t words = getWords();
-  auto array = outboxes.getDefiningOp<memref::AllocaOp>();
+  auto array = buffers.getDefiningOp<memref::AllocaOp>();
   OpBuilder builder(array);
   Type i64 = builder.getI64Type();
   // A word of all threads is in one piece: a warp finds it at once.
-  Value all = addBlockMemory(launch, words * threads, i64);
+  Value all = addSharedMemory(launch, words * threads, i64);
   auto type =
       MemRefType::get(words, i64,
                       StridedLayoutAttr::get(builder.getContext(),
                                              ShapedType::kDynamic, threads),
                       cast<MemRefType>(all.getType()).getMemorySpace());
-  outboxes = memref::ReinterpretCastOp::create(
+  buffers = memref::ReinterpretCastOp::create(
       builder, loc, type, all, OpFoldResult(launch.getThreadIds().x),
       ArrayRef<OpFoldResult>{builder.getIndexAttr(words)},
       ArrayRef<OpFoldResult>{builder.getIndexAttr(threads)});
-  array.replaceAllUsesWith(outboxes);
+  array.replaceAllUsesWith(buffers);
   array.erase();
 }
 
@@ -72,8 +73,8 @@ void GridMemory::setPosition(OpBuilder &builder, Value position) {
   Value word =
       arith::IndexCastOp::create(builder, loc, builder.getI64Type(), position);
   memref::StoreOp::create(
-      builder, loc, word, outboxes,
-      arith::ConstantIndexOp::create(builder, loc, PIKOIR_OUTBOX_POSITION)
+      builder, loc, word, buffers,
+      arith::ConstantIndexOp::create(builder, loc, PIKOIR_APPEND_POSITION)
           .getResult());
 }
 

@@ -5,14 +5,15 @@
 // every thread alike; instead each thread computes that of another primitive:
 //
 //   for each group of as many primitives as threads
-//     setup of mine; what the pixels need of it goes to the block's memory
+//     setup of mine; what the pixels need of it goes to shared memory
 //     barrier
 //     for each primitive of the group
-//       my pixels, from the block's memory
+//       my pixels, from shared memory
 //     barrier
 //
-// What is left to the pixels, SetupSplit.cpp says. Errors keep the order of
-// primitives, because each notes which one it is about.
+// What is left to the pixels, SetupSplit.cpp says. Where shared memory has no
+// room for all of the setup, only fields of primitives are shared. Errors keep
+// the order of primitives, because each notes which one it is about.
 
 #include "PikoToGPU/ItemSetup.h"
 
@@ -47,7 +48,7 @@ void ItemSetup::placeShared() {
   }
   llvm::DenseMap<Type, Value> arrays;
   for (auto [type, size] : sizes)
-    arrays[type] = addBlockMemory(memory.launch, size, type);
+    arrays[type] = addSharedMemory(memory.launch, size, type);
   for (auto &[value, place] : places)
     place.memory = arrays.lookup(SetupSplit::getStorage(value.getType()));
 }
@@ -186,7 +187,7 @@ void piko::shareSetup(scf::ForOp items, const ThreadTile &tile,
   Location loc = items.getLoc();
   OpBuilder builder(items);
   Value begin = items.getLowerBound(), end = items.getUpperBound();
-  int64_t room = maxBlockBytes - 8 * PIKOIR_FLUSH_CELLS;
+  int64_t room = maxSharedBytes - 8 * PIKOIR_FLUSH_WORDS;
   std::optional<ItemSetup> setup;
   for (Extent extent : {Extent::All, Extent::Fields})
     if (setup.emplace(items, tile, memory, extent); setup->countBytes() <= room)

@@ -20,7 +20,7 @@ public:
 
   bool isEmpty() const { return split.shared.empty(); }
   int64_t countBytes() const { return threads * split.countBytes(); }
-  /// In front of the loop over the primitives of a group: the setup of the
+  /// Before the loop over the primitives of a group: the setup of the
   /// thread's own, which is the one at `position`. `atPixels` gets, in the
   /// setup, what is left to the pixels where it stood, with the setup's values.
   using PixelHook = llvm::function_ref<void(
@@ -44,13 +44,13 @@ private:
   GridMemory &memory;
   int64_t threads;
   SetupSplit split;
-  /// Where a value is in memory: the thread's number behind `first`.
-  struct Place {
+  /// Where a value is in memory: the thread's number after `first`.
+  struct SharedPlace {
     mlir::Value memory;
     int64_t first = 0;
   };
-  llvm::MapVector<mlir::Value, Place> places;    ///< What pixels need.
-  llvm::SmallVector<mlir::memref::LoadOp> loads; ///< What pixels take of it.
+  llvm::MapVector<mlir::Value, SharedPlace> places; ///< What pixels need.
+  llvm::SmallVector<mlir::memref::LoadOp> loads;    ///< What pixels take of it.
 };
 
 } // namespace piko

@@ -9,7 +9,7 @@
 using namespace mlir;
 using namespace piko;
 
-std::optional<CountedLoop> piko::matchCountedLoop(Operation *op) {
+std::optional<NestLoop> piko::matchCountedLoop(Operation *op) {
   auto loop = dyn_cast<scf::WhileOp>(op);
   if (!loop || loop.getNumOperands() != 1 || loop.getNumResults() != 1)
     return std::nullopt;
@@ -30,12 +30,11 @@ std::optional<CountedLoop> piko::matchCountedLoop(Operation *op) {
       next.getLhs() != loop.getAfterArguments()[0] ||
       !matchPattern(next.getRhs(), m_One()))
     return std::nullopt;
-  return CountedLoop{loop, loop.getOperand(0), test.getRhs(),
-                     test.getPredicate()};
+  return NestLoop{loop, loop.getOperand(0), test.getRhs(), test.getPredicate()};
 }
 
-std::optional<CountedLoop> piko::matchInnerLoop(CountedLoop outer) {
-  std::optional<CountedLoop> inner;
+std::optional<NestLoop> piko::matchInnerLoop(NestLoop outer) {
+  std::optional<NestLoop> inner;
   for (Operation &op : outer.body()->without_terminator()) {
     if (!op.getNumRegions() && isMemoryEffectFree(&op))
       continue;
@@ -52,14 +51,13 @@ std::optional<CountedLoop> piko::matchInnerLoop(CountedLoop outer) {
 }
 
 void piko::coalesceLoops(Operation *op) {
-  std::optional<CountedLoop> outer = matchCountedLoop(op);
-  std::optional<CountedLoop> inner =
-      outer ? matchInnerLoop(*outer) : std::nullopt;
+  std::optional<NestLoop> outer = matchCountedLoop(op);
+  std::optional<NestLoop> inner = outer ? matchInnerLoop(*outer) : std::nullopt;
   if (!inner || !op->use_empty())
     return;
   OpBuilder builder(op);
   Location loc = op->getLoc();
-  auto goesOn = [](OpBuilder &at, Location where, const CountedLoop &counted,
+  auto goesOn = [](OpBuilder &at, Location where, const NestLoop &counted,
                    Value number) -> Value {
     return arith::CmpIOp::create(at, where, counted.predicate, number,
                                  counted.bound);

@@ -12,7 +12,7 @@ namespace piko {
 
 /// for (i = first; i < bound or i <= bound; ++i), where the loop hands on
 /// nothing else.
-struct CountedLoop {
+struct NestLoop {
   mlir::scf::WhileOp loop;
   mlir::Value first, bound;
   mlir::arith::CmpIPredicate predicate;
@@ -24,11 +24,11 @@ struct CountedLoop {
   mlir::Block *body() { return loop.getAfterBody(); }
 };
 
-std::optional<CountedLoop> matchCountedLoop(mlir::Operation *op);
+std::optional<NestLoop> matchCountedLoop(mlir::Operation *op);
 
 /// The loop in another one that has nothing else with an effect in it, and
 /// counts from and to the same in each of its iterations.
-std::optional<CountedLoop> matchInnerLoop(CountedLoop outer);
+std::optional<NestLoop> matchInnerLoop(NestLoop outer);
 
 /// Makes one loop of two that are nested (loop coalescing), in which a thread
 /// that has come to the end of a row goes on with the next one at once.

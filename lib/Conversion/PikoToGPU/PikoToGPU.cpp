@@ -2,16 +2,18 @@
 //
 // convert-piko-to-gpu: for each kernel, as piko-map-threads says,
 //   1. make a launch with a block for each unit of the stored bins, and in it
-//      loops over its cells and their primitives (GridFormer); where there are
-//      fewer blocks, say which runs which unit (UnitCounter.cpp);
+//      loops over its buckets and their primitives (GridFormer); where there
+//      are fewer blocks, say which runs which unit (UnitCounter.cpp);
 //   2. where threads share pixels, take primitives in groups, whose setup they
 //      share (CollapsedPixels.cpp and RareLaunch.cpp, or PixelSharing.cpp and
 //      ItemSetup.cpp);
 //   3. otherwise convert loops as they are mapped (BarrierLoops.cpp), put off
-//      those of atomics (DeferredWork.cpp), set rare branches apart
+//      those of atomics (CompactedWork.cpp), set rare branches apart
 //      (RareBranches.cpp and RareRounds.cpp), and map the block's work to its
 //      threads (BlockMapping.cpp);
-//   4. convert access to state, and open a log for what the grid leaves;
+//   4. convert access to state as convert-piko-to-scf does, where one outside
+//      is an entry of the append buffer, and open a log for what the grid
+//      leaves;
 //   5. if it precedes another kernel, become a launch of that one's.
 
 #include "PikoToGPU/PikoToGPU.h"
@@ -55,7 +57,7 @@ public:
 
 private:
   void formGrid();
-  /// Opens outboxes; `work` is what the grid was made of.
+  /// Opens append buffers; `work` is what the grid was made of.
   void createMemory();
   void convertLocal(LocalBinOp local);
   LogicalResult finish(GridMemory &memory, bool hasRare);
@@ -107,14 +109,14 @@ void GridBuilder::formGrid() {
 void GridBuilder::createMemory() {
   OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
   Type i64 = builder.getI64Type();
-  memory.outboxes = memref::AllocaOp::create(
+  memory.buffers = memref::AllocaOp::create(
       builder, loc, MemRefType::get({memory.getWords()}, i64));
-  memory.cells = addBlockMemory(launch, PIKOIR_FLUSH_CELLS, i64);
+  memory.flushWords = addSharedMemory(launch, PIKOIR_FLUSH_WORDS, i64);
   ArrayAttr producers;
   DenseI64ArrayAttr ports;
   if (!memory.locals.empty()) {
     int64_t count = memory.locals.size();
-    memory.kept = addBlockMemory(launch, count * PIKOIR_LOCAL_WORDS, i64);
+    memory.kept = addSharedMemory(launch, count * PIKOIR_LOCAL_WORDS, i64);
     producers = builder.getArrayAttr(llvm::map_to_vector(
         memory.locals, [](auto edge) -> Attribute { return edge.first; }));
     ports = builder.getDenseI64ArrayAttr(llvm::map_to_vector(
@@ -123,11 +125,11 @@ void GridBuilder::createMemory() {
   bool emits = contains(launch, [](Operation *op) {
     return isa<AppendOp, AppendBinOp, NextOp>(op);
   });
-  OutboxesOp::create(builder, loc, memory.log, memory.outboxes, producers,
-                     ports, memory.kept, /*forErrors=*/!emits);
+  AppendBuffersOp::create(builder, loc, memory.log, memory.buffers, producers,
+                          ports, memory.kept, /*forErrors=*/!emits);
 }
 
-/// What the block has of a local edge is one cell, or as many calls as there
+/// What the block has of a local edge is one bucket, or as many calls as there
 /// are batches; an empty one is called only if the stage runs for every bin.
 void GridBuilder::convertLocal(LocalBinOp local) {
   auto stage = lookupInPipeline<StageOp>(local, local.getStageAttr());
@@ -146,9 +148,9 @@ void GridBuilder::convertLocal(LocalBinOp local) {
   for (Operation *user :
        llvm::make_early_inc_range(local.getBins().getUsers())) {
     builder.setInsertionPoint(user);
-    if (isa<UnitCellsOp>(user)) {
+    if (isa<UnitBucketsOp>(user)) {
       user->replaceAllUsesWith(ValueRange{zero, calls});
-    } else if (isa<CellRangeOp>(user)) {
+    } else if (isa<BucketRangeOp>(user)) {
       user->replaceAllUsesWith(ValueRange{zero, count});
     } else if (auto range = dyn_cast<CallRangeOp>(user)) {
       Value begin = arith::MulIOp::create(builder, loc, range.getCall(), batch);
@@ -162,16 +164,16 @@ void GridBuilder::convertLocal(LocalBinOp local) {
   }
 }
 
-/// Threads begin with empty outboxes, and leave what is in them at the end of
-/// each unit. `countsInBlock`: the numbers of the unit and the cell take no
-/// registers.
+/// Threads begin with empty append buffers, and leave what is in them at the
+/// end of each unit. `countsInBlock`: the numbers of the unit and the bucket
+/// take no registers.
 void GridBuilder::finishGrid(GridMemory &memory, bool countsInBlock) {
-  auto opened = *memory.outboxes.getUsers().begin();
-  for (Operation *user : memory.outboxes.getUsers())
-    if (isa<OutboxesOp>(user))
+  auto opened = *memory.buffers.getUsers().begin();
+  for (Operation *user : memory.buffers.getUsers())
+    if (isa<AppendBuffersOp>(user))
       opened = user;
   OpBuilder builder(opened);
-  memory.clearOutboxes(builder);
+  memory.clearAppendBuffers(builder);
   if (memory.kept) {
     Value zero = arith::ConstantIntOp::create(builder, loc, 0, 64);
     int64_t words = memory.locals.size() * PIKOIR_LOCAL_WORDS;
@@ -185,7 +187,7 @@ void GridBuilder::finishGrid(GridMemory &memory, bool countsInBlock) {
   memory.flush(builder);
   scf::ForOp units = repeatForUnits(memory.launch, bins, opened);
   if (countsInBlock)
-    countCellsInBlock(units, memory.launch);
+    countBucketsInBlock(units, memory.launch);
   if (order == UnitOrder::Taken)
     takeUnits(units, memory.launch, memory.log, countsInBlock);
   else if (countsInBlock)
@@ -370,7 +372,7 @@ LogicalResult GridBuilder::mapWork() {
       shared.push_back(loop);
   });
   for (scf::ForOp loop : shared)
-    deferWork(loop, memory, threads);
+    compactWork(loop, memory, threads);
   std::optional<GridMemory> rest;
   bool hasRare = false;
   // What a launch leaves is for the kernel itself.
@@ -398,7 +400,7 @@ LogicalResult GridBuilder::finish(GridMemory &memory, bool hasRare) {
   if (memory.rare && !memory.rare->found)
     takeUnitsForRest(memory.launch);
   if (hasRare)
-    memory.keepOutboxesInBlock(threads);
+    memory.keepAppendBuffersInBlock(threads);
   return success();
 }
 
@@ -461,5 +463,5 @@ void ConvertPikoToGPUPass::runOnOperation() {
   auto kernels = llvm::to_vector(pipeline.getOps<KernelOp>());
   for (KernelOp kernel : llvm::reverse(kernels))
     if (FlatSymbolRefAttr next = kernel.getPrecedesAttr())
-      launchInFrontOf(lookupInPipeline<KernelOp>(kernel, next), kernel);
+      launchBefore(lookupInPipeline<KernelOp>(kernel, next), kernel);
 }

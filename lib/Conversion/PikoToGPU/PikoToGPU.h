@@ -76,15 +76,15 @@ bool hasRareIterationsOnly(mlir::Operation *loop);
 /// share, which become functions; how many.
 int64_t setRareBranchesApart(mlir::scf::ForOp loop);
 
-/// Puts a second launch behind that of `memory`, for units in which primitives
+/// Puts a second launch after that of `memory`, for units in which primitives
 /// of a shared loop are rare; what that has. Nothing where it would show.
 std::optional<GridMemory> leaveRareRounds(mlir::scf::ForOp loop,
                                           GridMemory &memory);
-/// Lets a launch leave units, or go on with them; behind mapBlock.
+/// Lets a launch leave units, or go on with them; after mapBlock.
 void finishRareRounds(GridMemory &memory);
 
-/// What threads that share the iterations of a loop put off, in the block's
-/// memory (DeferredWork.cpp).
+/// What threads that share the iterations of a loop put off, in shared memory
+/// (CompactedWork.cpp).
 struct WorkQueue {
   int64_t capacity, threads;
   mlir::Value count; ///< How many wait.
@@ -95,7 +95,7 @@ struct WorkQueue {
   /// A loop over those that wait, of which each thread takes some.
   mlir::scf::ForOp work;
 
-  /// Behind a round of iterations, in which as many as there are threads may
+  /// After a round of iterations, in which as many as there are threads may
   /// have come: does the work if there may be no room for another round, or
   /// `isLast`.
   void drain(mlir::OpBuilder &builder, mlir::Value isLast);
@@ -103,24 +103,24 @@ struct WorkQueue {
 };
 
 /// Where threads share primitives in rounds, and leave a unit to a second
-/// launch in front of a round with a rare one (RareRounds.cpp).
+/// launch before a round with a rare one (RareRounds.cpp).
 struct RareRounds {
-  mlir::scf::ForOp cells, loop; ///< Over the unit's cells, and primitives.
-  /// What becomes of the loop: rounds, and in one a thread's turn.
+  mlir::scf::ForOp buckets, loop; ///< Over the unit's buckets, and primitives.
+  /// What becomes of the loop: rounds, and in one a thread's iteration.
   mlir::scf::ForOp rounds;
-  mlir::scf::IfOp turn;
-  /// Of the first launch, in the block's memory: whether a thread has come to a
+  mlir::scf::IfOp iteration;
+  /// Of the first launch, in shared memory: whether a thread has come to a
   /// rare primitive, and whether the unit has been left.
   mlir::Value found, left;
 };
 
-/// What a grid has for what its threads emit (piko.gpu.outboxes).
+/// What a grid has for what its threads emit (piko.gpu.append_buffers).
 struct GridMemory {
   mlir::gpu::LaunchOp launch;
   mlir::Value log;
-  mlir::Value outboxes;    ///< A thread's.
-  mlir::Value kept, cells; ///< The block's.
-  mlir::Attribute stage;   ///< The kernel's.
+  mlir::Value buffers;          ///< A thread's.
+  mlir::Value kept, flushWords; ///< The block's.
+  mlir::Attribute stage;        ///< The kernel's.
   /// Producer and port of each local edge.
   llvm::SmallVector<std::pair<mlir::FlatSymbolRefAttr, int64_t>> locals;
   /// What iterations of loops that threads share put off.
@@ -133,10 +133,10 @@ struct GridMemory {
   /// Where the words of a local edge begin.
   int64_t getLocalBase(LocalBinOp local);
   void flush(mlir::OpBuilder &builder);
-  void clearOutboxes(mlir::OpBuilder &builder);
-  /// Puts the outboxes of threads, which are many numbers, into the block's
+  void clearAppendBuffers(mlir::OpBuilder &builder);
+  /// Puts the append buffers of threads, which are many numbers, into shared
   /// memory.
-  void keepOutboxesInBlock(int64_t threads);
+  void keepAppendBuffersInBlock(int64_t threads);
   /// Which primitive errors are about from here on.
   void setPosition(mlir::OpBuilder &builder, mlir::Value position);
   void setLocalCount(mlir::OpBuilder &builder, LocalBinOp local,
@@ -147,8 +147,8 @@ struct GridMemory {
 /// Puts off what a loop whose iterations threads share does in an inner loop by
 /// atomics alone, whose order nobody sees. False where there is nothing of
 /// that kind.
-bool deferWork(mlir::scf::ForOp loop, GridMemory &memory, int64_t threads);
-/// Where a block begins; behind mapBlock.
+bool compactWork(mlir::scf::ForOp loop, GridMemory &memory, int64_t threads);
+/// Where a block begins; after mapBlock.
 void beginQueues(GridMemory &memory);
 
 /// Maps a block's work to its threads: the first thread does what has effects,
@@ -157,11 +157,11 @@ void beginQueues(GridMemory &memory);
 llvm::LogicalResult mapBlock(GridMemory &memory);
 
 /// Memory that the threads of a block share.
-mlir::Value addBlockMemory(mlir::gpu::LaunchOp launch,
-                           llvm::ArrayRef<int64_t> shape, mlir::Type type);
+mlir::Value addSharedMemory(mlir::gpu::LaunchOp launch,
+                            llvm::ArrayRef<int64_t> shape, mlir::Type type);
 
 /// Turns a parallel loop of at most as many iterations as the block has threads
-/// into what each of these does. What a thread alone does is behind tests,
+/// into what each of these does. What a thread alone does is under tests,
 /// which `ofOne` gets; arrays of one iteration go to `ownArrays`.
 struct ThreadOperations {
   llvm::DenseSet<mlir::Operation *> ofOne, ownArrays;
@@ -171,7 +171,7 @@ llvm::LogicalResult mapIterations(ParallelForOp loop,
                                   ThreadOperations &made);
 
 /// What every GPU's blocks have.
-constexpr int64_t maxThreads = 1024, maxBlockBytes = 48 << 10, warpSize = 32;
+constexpr int64_t maxThreads = 1024, maxSharedBytes = 48 << 10, warpSize = 32;
 
 } // namespace piko
 

@@ -73,13 +73,13 @@ private:
   /// Of the block. The ticket has the boxes in its upper bits, and the pixels
   /// of all of them below.
   mlir::Value ticket, limit, listed, slots, starts, masks, touched, list;
-  /// The first rare primitive of the group, when its setup has ended: in the
-  /// block's memory, where each thread finds what all of them have written.
+  /// The first rare primitive of the group, when its setup has ended: in shared
+  /// memory, where each thread finds what all of them have written.
   mlir::Value until;
   RareSite site;
 };
 
-/// What a block on the way to the work has in front of an operation.
+/// What a block on the way to the work has before an operation.
 void cloneUntil(Emitter &b, mlir::Block *block, mlir::Operation *end,
                 mlir::IRMapping &mapping);
 

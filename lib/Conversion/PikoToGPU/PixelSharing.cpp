@@ -3,7 +3,7 @@
 // Shares the pixels of a bin among the threads of a block. For each dimension,
 //   1. a loop that counts through the coordinate of all that it does steps from
 //      one of the thread's own pixels to the next;
-//   2. other updates, and what depends on their outcomes, are behind a test.
+//   2. other updates, and what depends on their outcomes, are under a test.
 
 #include "PikoToGPU/Mapping/PixelOwners.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The updates of covered pixels, in the order of primitives, and what is done
-// with the rare primitive behind them. Which pixels those are,
+// with the rare primitive after them. Which pixels those are,
 // CollapsedPixels.cpp finds.
 
 #include "PikoToGPU/PixelGroups.h"

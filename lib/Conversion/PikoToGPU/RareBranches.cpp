@@ -31,8 +31,8 @@ static SmallVector<memref::AllocaOp> findArraysOutside(Operation *op,
   return arrays;
 }
 
-/// The way of a condition in a loop that has arrays of its turn for itself,
-/// where the other one uses none; null if there is no such way.
+/// The way of a condition in a loop that has arrays of its iteration for
+/// itself, where the other one uses none; null if there is no such way.
 static Region *findRareWay(scf::IfOp branch, Operation *loop) {
   SmallVector<Region *> ways;
   for (Region &region : branch->getRegions()) {

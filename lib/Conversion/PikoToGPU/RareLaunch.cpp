@@ -27,7 +27,7 @@ static void leaveUnits(RareSite &site, gpu::LaunchOp launch,
   auto groups = cast<scf::WhileOp>(copies.lookup(site.groups.getOperation()));
   auto rest = cast<RestOp>(copies.lookup(site.rest.getOperation()));
   Emitter b(groups.getLoc(), groups);
-  // Cells behind the one that was left are left, too.
+  // Buckets after the one that was left are left, too.
   Value end = copyOf(site.end);
   groups->setOperand(0, b.select(copyOf(site.isLeft), end, copyOf(site.begin)));
 

@@ -6,9 +6,12 @@
 //      that is found: what the threads have emitted in this round is dropped,
 //      and its position left in the log. No call;
 //   2. for units of which something was left, rounds from there on, with calls.
-// Emissions keep their order: the second launch's directories come behind those
+// All that the usual way does is to emit: anything else would be done twice.
+// Emissions keep their order: the second launch's directories come after those
 // of the first. Where work in the same bin takes what is emitted, the unit is
-// left where that bin begins, and what was kept of it is forgotten.
+// left where that bin begins, and what was kept of it is forgotten. What
+// threads have of append buffers is in shared memory then, as are the counters
+// of units and buckets.
 
 #include "PikoToGPU/PikoToGPU.h"
 
@@ -40,12 +43,12 @@ static SmallVector<scf::ExecuteRegionOp> findRare(Operation *loop) {
   return rare;
 }
 
-/// The loop over cells around a loop over primitives that are stored.
-static scf::ForOp getCells(scf::ForOp loop, gpu::LaunchOp launch) {
-  auto cells = dyn_cast<scf::ForOp>(loop->getParentOp());
-  bool isIt = cells && cells->getParentOp() == launch &&
-              cells.getUpperBound().getDefiningOp<UnitCellsOp>();
-  return isIt ? cells : scf::ForOp();
+/// The loop over buckets around a loop over primitives that are stored.
+static scf::ForOp getBuckets(scf::ForOp loop, gpu::LaunchOp launch) {
+  auto buckets = dyn_cast<scf::ForOp>(loop->getParentOp());
+  bool isIt = buckets && buckets->getParentOp() == launch &&
+              buckets.getUpperBound().getDefiningOp<UnitBucketsOp>();
+  return isIt ? buckets : scf::ForOp();
 }
 
 /// Whether a loop emits to work in the same bin alone, and tells no positions.
@@ -63,8 +66,8 @@ static bool emitsLocally(scf::ForOp loop, const GridMemory &memory) {
 }
 
 static bool canLeave(scf::ForOp loop, const GridMemory &memory) {
-  scf::ForOp cells = getCells(loop, memory.launch);
-  if (!cells || !memory.queues.empty())
+  scf::ForOp buckets = getBuckets(loop, memory.launch);
+  if (!buckets || !memory.queues.empty())
     return false;
   SmallVector<scf::ExecuteRegionOp> rare = findRare(loop);
   if (rare.empty() || llvm::any_of(rare, [](scf::ExecuteRegionOp apart) {
@@ -76,7 +79,7 @@ static bool canLeave(scf::ForOp loop, const GridMemory &memory) {
       return apart->isProperAncestor(op);
     });
   };
-  for (Operation &op : *cells.getBody())
+  for (Operation &op : *buckets.getBody())
     if (&op != loop && !isa<LocalBinOp>(op) &&
         contains(&op, [](Operation *inner) {
           return changesState(inner) || isa<AppendOp, NextOp>(inner);
@@ -100,17 +103,17 @@ std::optional<GridMemory> piko::leaveRareRounds(scf::ForOp loop,
   StringRef name = first.getFunctionAttr().getLeafReference();
   rest.launch.setFunctionAttr(
       FlatSymbolRefAttr::get(builder.getContext(), (name + "_rest").str()));
-  for (Value *each : {&rest.outboxes, &rest.kept, &rest.cells})
+  for (Value *each : {&rest.buffers, &rest.kept, &rest.flushWords})
     if (*each)
       *each = copies.lookup(*each);
   rest.rare.emplace();
   rest.rare->loop = cast<scf::ForOp>(copies.lookup(loop.getOperation()));
-  rest.rare->cells = getCells(rest.rare->loop, rest.launch);
+  rest.rare->buckets = getBuckets(rest.rare->loop, rest.launch);
   memory.rare.emplace();
   memory.rare->loop = loop;
-  memory.rare->cells = getCells(loop, first);
-  memory.rare->found = addBlockMemory(first, 1, builder.getI32Type());
-  memory.rare->left = addBlockMemory(first, 1, builder.getI32Type());
+  memory.rare->buckets = getBuckets(loop, first);
+  memory.rare->found = addSharedMemory(first, 1, builder.getI32Type());
+  memory.rare->left = addSharedMemory(first, 1, builder.getI32Type());
   for (scf::ExecuteRegionOp apart : findRare(loop)) {
     Emitter b(apart.getLoc(), apart);
     b.store(b.number(1), memory.rare->found, b.index(0));
@@ -122,12 +125,12 @@ std::optional<GridMemory> piko::leaveRareRounds(scf::ForOp loop,
 /// The second launch begins where the first one has left a unit.
 static void resume(GridMemory &memory) {
   RareRounds &rare = *memory.rare;
-  Emitter b(rare.cells.getLoc(), rare.cells);
+  Emitter b(rare.buckets.getLoc(), rare.buckets);
   Value rest = RestOp::create(b, b.getIndexType(), memory.log,
                               memory.launch.getBlockIds().x);
   Value isLeft = b.is(rest, Predicate::ne, b.index(0));
   Value place = b.sub(rest, b.index(1));
-  scf::ForOp loop = memory.locals.empty() ? rare.rounds : rare.cells;
+  scf::ForOp loop = memory.locals.empty() ? rare.rounds : rare.buckets;
   Emitter in(loop.getLoc(), loop);
   Value from = arith::MaxSIOp::create(in, loop.getLowerBound(), place);
   loop.setLowerBound(in.select(isLeft, from, loop.getUpperBound()));
@@ -136,20 +139,20 @@ static void resume(GridMemory &memory) {
 /// Nothing that threads have emitted since the last flush was ever there.
 static void dropEmissions(Emitter &b, GridMemory &memory) {
   for (int64_t base = 0, e = memory.getWords(); base < e;
-       base += PIKOIR_OUTBOX_WORDS) {
+       base += PIKOIR_APPEND_WORDS) {
     auto at = [&](int64_t word) { return b.index(base + word); };
-    b.store(b.load(memory.outboxes, at(PIKOIR_OUTBOX_CURSOR)), memory.outboxes,
-            at(PIKOIR_OUTBOX_BEGIN));
-    b.store(b.number(b.getI64Type(), 0), memory.outboxes,
-            at(PIKOIR_OUTBOX_KEPT));
+    b.store(b.load(memory.buffers, at(PIKOIR_APPEND_CURSOR)), memory.buffers,
+            at(PIKOIR_APPEND_BEGIN));
+    b.store(b.number(b.getI64Type(), 0), memory.buffers,
+            at(PIKOIR_APPEND_KEPT));
   }
 }
 
-/// The first launch ends a unit in front of the first round with a rare
+/// The first launch ends a unit before the first round with a rare
 /// primitive.
 static void leave(GridMemory &memory) {
   RareRounds &rare = *memory.rare;
-  Emitter begin(rare.cells.getLoc(), rare.cells);
+  Emitter begin(rare.buckets.getLoc(), rare.buckets);
   Value thread = memory.launch.getThreadIds().x;
   Value isFirst = begin.is(thread, Predicate::eq, begin.index(0));
   Emitter one = begin.when(isFirst);
@@ -166,18 +169,18 @@ static void leave(GridMemory &memory) {
   Value isFound = b.is(b.loadAgain(rare.found), Predicate::ne, b.number(0));
   Emitter found = b.when(isFound);
   dropEmissions(found, memory);
-  // Rounds behind it come here, too.
+  // Rounds after it come here, too.
   Emitter leaves = found.when(found.both(isFirst, isThere(found)));
   leaves.store(leaves.number(1), rare.left, leaves.index(0));
   LeaveRestOp::create(leaves, memory.log, memory.launch.getBlockIds().x,
                       memory.locals.empty() ? rare.rounds.getInductionVar()
-                                            : rare.cells.getInductionVar());
+                                            : rare.buckets.getInductionVar());
 
-  Emitter top(rare.rounds.getLoc(), rare.turn);
-  rare.turn.getConditionMutable().assign(
-      top.both(rare.turn.getCondition(), isThere(top)));
+  Emitter top(rare.rounds.getLoc(), rare.iteration);
+  rare.iteration.getConditionMutable().assign(
+      top.both(rare.iteration.getCondition(), isThere(top)));
   for (auto local :
-       llvm::to_vector(rare.cells.getBody()->getOps<LocalBinOp>())) {
+       llvm::to_vector(rare.buckets.getBody()->getOps<LocalBinOp>())) {
     Emitter at(local.getLoc(), local);
     Emitter inside = at.when(isThere(at));
     local->moveBefore(&*inside.getInsertionPoint());

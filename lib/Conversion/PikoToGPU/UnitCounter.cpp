@@ -6,12 +6,12 @@
 //      taken at a time. A grid of as many blocks as there are units takes none:
 //      block b has unit b, and it is the hardware that begins one where another
 //      has ended.
-//   2. In front of each unit it finds the unit's number: the next one of those
+//   2. Before each unit it finds the unit's number: the next one of those
 //      that the block has, or else the launch's counter is moved on by an
 //      atomic addition.
-//   3. Behind a barrier all threads read it in the block's memory, and end
+//   3. After a barrier all threads read it in shared memory, and end
 //      alike where there is none.
-// What only the first thread needs is in the block's memory, too: it would take
+// What only the first thread needs is in shared memory, too: it would take
 // registers of all threads for as long as the kernel runs.
 
 #include "Piko/Conversion/UnitOrder.h"
@@ -63,7 +63,7 @@ private:
   gpu::LaunchOp launch;
   Value log;
   UnitCountOp count;
-  /// In the block's memory: the unit that it runs, the end of those that it has
+  /// In shared memory: the unit that it runs, the end of those that it has
   /// taken, and how many it takes at a time, 0 where it takes none.
   Value unit, end, several;
 };
@@ -96,11 +96,10 @@ void UnitTaking::begin(Emitter &b) {
   Value shift = toUnit(b, b.sub(b.number(bits), zeros));
   Value many = arith::MaxUIOp::create(b, b.shr(count, shift), b.index(1));
   b.store(b.select(isOwn, zero, toNumber(b, many)), several, b.index(0));
-  // In front of the block's own.
-  Value before = b.sub(number, b.number(1)),
-        behind = b.add(number, b.number(1));
+  // Before the block's own.
+  Value before = b.sub(number, b.number(1)), after = b.add(number, b.number(1));
   b.store(b.select(isOwn, before, b.number(none)), unit, b.index(0));
-  b.store(b.select(isOwn, behind, zero), end, b.index(0));
+  b.store(b.select(isOwn, after, zero), end, b.index(0));
 }
 
 Value UnitTaking::take(Emitter &b, Value number) {
@@ -132,7 +131,7 @@ void UnitTaking::run(bool inBlock) {
   Emitter b =
       outside.when(outside.is(launch.getBlockIds().x, Predicate::ult, count));
   for (Value *word : {&unit, &end, &several})
-    *word = addBlockMemory(launch, 1, b.getI32Type());
+    *word = addSharedMemory(launch, 1, b.getI32Type());
   Emitter first = b.when(isFirstThread(b));
   begin(first);
   auto made = scf::WhileOp::create(

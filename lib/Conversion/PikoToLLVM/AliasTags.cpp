@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Each load, store and call says in TBAA what it touches: of state and of
+// primitives each field by itself, and what is the runtime's own. So LLVM keeps
+// in registers what an access does not touch.
 
 #include "PikoToLLVM/AliasTags.h"
 
@@ -55,9 +59,9 @@ ArrayAttr AliasTags::call(StringRef function) const {
       PIKO_RUNTIME_FUNCTION(pikoir_place).name,
       PIKO_RUNTIME_FUNCTION(pikoir_next).name,
       PIKO_RUNTIME_FUNCTION(pikoir_place_source).name,
-      PIKO_RUNTIME_FUNCTION(pikoir_defer_begin).name,
-      PIKO_RUNTIME_FUNCTION(pikoir_defer_end).name,
-      PIKO_RUNTIME_FUNCTION(pikoir_defer_iteration).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_reorder_begin).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_reorder_end).name,
+      PIKO_RUNTIME_FUNCTION(pikoir_reorder_iteration).name,
       PIKO_RUNTIME_FUNCTION(pikoir_scratch_mark).name,
       PIKO_RUNTIME_FUNCTION(pikoir_scratch).name,
       PIKO_RUNTIME_FUNCTION(pikoir_scratch_release).name};

@@ -9,7 +9,7 @@
 //     failure        what pikoir_fail keeps
 //     runtime        what calls for emissions may touch
 //       RECORD.FIELD   numbers of primitives, read or emitted
-//       writer         pikoir_writer, its ports and its lists of cells
+//       writer         pikoir_writer, its ports and its lists of buckets
 //       input          pikoir_input and what it leads to, but for primitives
 //
 // An access may alias one with the same node, with a node above or with one

@@ -12,7 +12,7 @@ using namespace piko;
 // What is counted is the runtime's by number.
 static_assert(int(CounterKind::Calls) == PIKORT_CALLS &&
               int(CounterKind::Iterations) == PIKORT_ITERATIONS &&
-              int(CounterKind::Turns) == PIKORT_TURNS &&
+              int(CounterKind::Trips) == PIKORT_TRIPS &&
               int(CounterKind::Emissions) == PIKORT_EMISSIONS &&
               int(CounterKind::Reads) == PIKORT_READS &&
               int(CounterKind::Stores) == PIKORT_STORES &&

@@ -26,10 +26,10 @@ template <typename OpT> struct Lowering : ContextPattern<OpT> {
   }
   mlir::Value load(mlir::OpBuilder &builder, mlir::Location loc,
                    mlir::Value base, const RuntimeMember &member,
-                   int64_t behind = 0) const {
+                   int64_t after = 0) const {
     return createLoad(builder, loc,
                       convertType(builder.getContext(), member.type),
-                      createOffset(builder, loc, base, member.offset + behind),
+                      createOffset(builder, loc, base, member.offset + after),
                       context.tags.input());
   }
   /// Whether positions lead to records by numbers.

@@ -21,9 +21,10 @@ constexpr RuntimeMember count = PIKO_RUNTIME_MEMBER(pikoir_input, count),
                         tiles = PIKO_RUNTIME_MEMBER(pikoir_input, tiles),
                         calls = PIKO_RUNTIME_MEMBER(pikoir_input, calls),
                         clears = PIKO_RUNTIME_MEMBER(pikoir_input, clears);
-constexpr RuntimeMember cellBegin =
-                            PIKO_RUNTIME_MEMBER(pikoir_unit, cell_begin),
-                        cellEnd = PIKO_RUNTIME_MEMBER(pikoir_unit, cell_end),
+constexpr RuntimeMember bucketBegin =
+                            PIKO_RUNTIME_MEMBER(pikoir_unit, bucket_begin),
+                        bucketEnd =
+                            PIKO_RUNTIME_MEMBER(pikoir_unit, bucket_end),
                         begin = PIKO_RUNTIME_MEMBER(pikoir_unit, begin),
                         end = PIKO_RUNTIME_MEMBER(pikoir_unit, end);
 constexpr RuntimeMember callBin = PIKO_RUNTIME_MEMBER(pikoir_call, bin),
@@ -110,17 +111,17 @@ struct ClearsLowering : Lowering<ClearsOp> {
   }
 };
 
-struct UnitCellsLowering : Lowering<UnitCellsOp> {
+struct UnitBucketsLowering : Lowering<UnitBucketsOp> {
   using Lowering::Lowering;
   LogicalResult
-  matchAndRewrite(UnitCellsOp op, OpAdaptor adaptor,
+  matchAndRewrite(UnitBucketsOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value units = context.member(rewriter, adaptor.getBins(), layout::units);
     Value unit =
         entry(rewriter, loc, units, adaptor.getUnit(), sizeof(pikoir_unit));
-    Value first = load(rewriter, loc, unit, layout::cellBegin);
-    Value last = load(rewriter, loc, unit, layout::cellEnd);
+    Value first = load(rewriter, loc, unit, layout::bucketBegin);
+    Value last = load(rewriter, loc, unit, layout::bucketEnd);
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, first), toIndex(rewriter, loc, last)});
     return success();
@@ -143,10 +144,10 @@ struct NextUnitLowering : Lowering<NextUnitOp> {
   }
 };
 
-struct CellRangeLowering : Lowering<CellRangeOp> {
+struct BucketRangeLowering : Lowering<BucketRangeOp> {
   using Lowering::Lowering;
   LogicalResult
-  matchAndRewrite(CellRangeOp op, OpAdaptor adaptor,
+  matchAndRewrite(BucketRangeOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value bins = adaptor.getBins();
@@ -154,14 +155,14 @@ struct CellRangeLowering : Lowering<CellRangeOp> {
     Value unit =
         entry(rewriter, loc, units, adaptor.getUnit(), sizeof(pikoir_unit));
     Value offsets = context.member(rewriter, bins, layout::offsets);
-    Value cell =
-        entry(rewriter, loc, offsets, adaptor.getCell(), sizeof(int64_t));
+    Value bucket =
+        entry(rewriter, loc, offsets, adaptor.getBucket(), sizeof(int64_t));
     Value begin = arith::MaxSIOp::create(
-        rewriter, loc, load(rewriter, loc, cell, layout::offset),
+        rewriter, loc, load(rewriter, loc, bucket, layout::offset),
         load(rewriter, loc, unit, layout::begin));
     Value end = arith::MinSIOp::create(
         rewriter, loc,
-        load(rewriter, loc, cell, layout::offset, sizeof(int64_t)),
+        load(rewriter, loc, bucket, layout::offset, sizeof(int64_t)),
         load(rewriter, loc, unit, layout::end));
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, begin), toIndex(rewriter, loc, end)});
@@ -169,16 +170,16 @@ struct CellRangeLowering : Lowering<CellRangeOp> {
   }
 };
 
-struct CellBinLowering : Lowering<CellBinOp> {
+struct BucketBinLowering : Lowering<BucketBinOp> {
   using Lowering::Lowering;
   LogicalResult
-  matchAndRewrite(CellBinOp op, OpAdaptor adaptor,
+  matchAndRewrite(BucketBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
     Value tiles =
         toIndex(rewriter, loc,
                 context.member(rewriter, adaptor.getBins(), layout::tiles));
-    rewriter.replaceOpWithNewOp<arith::DivUIOp>(op, adaptor.getCell(), tiles);
+    rewriter.replaceOpWithNewOp<arith::DivUIOp>(op, adaptor.getBucket(), tiles);
     return success();
   }
 };
@@ -402,7 +403,7 @@ struct GridLowering : Lowering<GridOp> {
                   ConversionPatternRewriter &rewriter) const override {
     Value extent =
         context.query(rewriter, op,
-                      op.getTiles() ? PIKO_RUNTIME_FUNCTION(pikoir_cell_grid)
+                      op.getTiles() ? PIKO_RUNTIME_FUNCTION(pikoir_tile_grid)
                                     : PIKO_RUNTIME_FUNCTION(pikoir_grid),
                       context.stageNumber(op, op.getStage()), op.getDim());
     rewriter.replaceOp(op, toIndex(rewriter, op.getLoc(), extent));
@@ -441,8 +442,8 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
   patterns.add<OpenBinsLowering, CloseBinsLowering, UnitCountLowering,
-               ClearsLowering, UnitCellsLowering, CellRangeLowering,
-               CellBinLowering, CallRangeLowering, CallBinLowering,
+               ClearsLowering, UnitBucketsLowering, BucketRangeLowering,
+               BucketBinLowering, CallRangeLowering, CallBinLowering,
                ItemLowering, PrefetchItemLowering, NoItemLowering,
                ToAddressLowering, FromAddressLowering,
 

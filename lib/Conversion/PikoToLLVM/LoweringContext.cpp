@@ -62,7 +62,7 @@ PipelineNumbers::PipelineNumbers(PipelineOp pipeline) : pipeline(pipeline) {
   });
 }
 
-/// What is internal comes behind what the host knows.
+/// What is internal comes after what the host knows.
 void PipelineNumbers::numberStates() {
   llvm::DenseSet<StringAttr> ofThreads;
   pipeline.walk([&](PrivateImagesOp op) {
@@ -153,13 +153,13 @@ Value LoweringContext::frame(Operation *op) const {
   return op->getParentOfType<func::FuncOp>().getArgument(0);
 }
 
-Grid *LoweringContext::grid(Operation *op) {
+GridContext *LoweringContext::grid(Operation *op) {
   auto launch = op->getParentOfType<gpu::LaunchOp>();
   auto found = grids.find(launch);
   return launch && found != grids.end() ? &found->second : nullptr;
 }
 
-void LoweringContext::noteGrid(Operation *inside, Grid grid) {
+void LoweringContext::noteGrid(Operation *inside, GridContext grid) {
   grids[inside->getParentOfType<gpu::LaunchOp>()] = grid;
 }
 

@@ -73,17 +73,17 @@ struct StateView {
 };
 
 /// What the threads of a grid leave their emissions in.
-struct Grid {
-  mlir::Value log;      ///< pikoir_log *
-  mlir::Value outboxes; ///< A thread's, PIKOIR_OUTBOX_WORDS each.
-  mlir::Value kept;     ///< The block's, PIKOIR_LOCAL_WORDS for a local edge.
+struct GridContext {
+  mlir::Value log;     ///< pikoir_log *
+  mlir::Value buffers; ///< A thread's, PIKOIR_APPEND_WORDS each.
+  mlir::Value kept;    ///< The block's, PIKOIR_LOCAL_WORDS for a local edge.
   /// Stage (-1 is the kernel's) and port of each local edge, and the size of
   /// its records.
   llvm::SmallVector<std::pair<int64_t, int64_t>> locals;
   llvm::SmallVector<int64_t> recordBytes;
   llvm::SmallVector<bool> placed; ///< Whether records are kept by placing them.
   bool forErrors =
-      false; ///< An outbox's words are in the log, from an error on.
+      false; ///< An append buffer's words are in the log, from an error on.
 };
 
 class LoweringContext {
@@ -116,7 +116,7 @@ public:
   /// Lets it go to a bin's pixels, with another pitch.
   void setTile(mlir::Operation *op, mlir::StringRef image, mlir::Value data,
                mlir::Value pitch);
-  /// The image itself, of which bins in front may have had tiles.
+  /// The image itself, of which bins before may have had tiles.
   const StateView &whole(mlir::OpBuilder &builder, mlir::Operation *op,
                          mlir::StringRef image);
   /// How many primitives a bin must have that a copy of its pixels pays (i64):
@@ -159,8 +159,8 @@ public:
   mlir::Value place(mlir::OpBuilder &builder, mlir::Operation *op);
 
   /// The grid that an operation is in, or null on a CPU.
-  Grid *grid(mlir::Operation *op);
-  void noteGrid(mlir::Operation *inside, Grid grid);
+  GridContext *grid(mlir::Operation *op);
+  void noteGrid(mlir::Operation *inside, GridContext grid);
   /// The number of another place that can fail, of all launches of a kernel.
   int32_t nextPlace(mlir::Operation *launch);
 
@@ -172,8 +172,8 @@ private:
   int64_t arrayCount = 0;
   llvm::StringMap<mlir::LLVM::LLVMFuncOp> called; // the runtime's
   llvm::DenseMap<mlir::Operation *, const PipelineNumbers *> functions;
-  llvm::DenseMap<mlir::Operation *, Grid> grids;     // by launch
-  llvm::DenseMap<mlir::Operation *, int32_t> places; // by function
+  llvm::DenseMap<mlir::Operation *, GridContext> grids; // by launch
+  llvm::DenseMap<mlir::Operation *, int32_t> places;    // by function
   /// By function and name.
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<StateView>> views, wholes;
   llvm::DenseMap<mlir::Operation *, llvm::StringMap<mlir::Value>> queries;
@@ -204,7 +204,7 @@ mlir::Value createI64(mlir::OpBuilder &builder, mlir::Location loc, int64_t v);
 mlir::Value toI64(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value v);
 mlir::Value toIndex(mlir::OpBuilder &builder, mlir::Location loc,
                     mlir::Value v);
-/// A pointer so many bytes behind another.
+/// A pointer so many bytes after another.
 mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Value pointer, int64_t bytes);
 mlir::Value createOffset(mlir::OpBuilder &builder, mlir::Location loc,

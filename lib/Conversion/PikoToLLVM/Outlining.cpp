@@ -43,7 +43,7 @@ static bool canBeMadeAgain(Operation *op) {
                 isa<LLVM::AddressOfOp, LLVM::ZeroOp>(op));
 }
 
-/// Makes a function, in front of the kernel, of what a block holds before its
+/// Makes a function, before the kernel, of what a block holds before its
 /// terminator.
 static func::FuncOp outline(Block &block, func::FuncOp kernel,
                             const Twine &name, const Captures &captures) {

@@ -116,10 +116,10 @@ static void noteSubject(func::FuncOp function, const PipelineNumbers &numbers) {
 static void expectSuccess(func::FuncOp function) {
   llvm::SetVector<Operation *> choices;
   function.walk([&](Operation *op) {
-    Operation *turns = op->getParentOp();
-    if (op->hasTrait<Failure>() && isa<scf::WhileOp>(turns) &&
-        isa<scf::IfOp>(turns->getParentOp()))
-      choices.insert(turns->getParentOp());
+    Operation *repeated = op->getParentOp();
+    if (op->hasTrait<Failure>() && isa<scf::WhileOp>(repeated) &&
+        isa<scf::IfOp>(repeated->getParentOp()))
+      choices.insert(repeated->getParentOp());
   });
   for (Operation *op : choices) {
     auto choice = cast<scf::IfOp>(op);

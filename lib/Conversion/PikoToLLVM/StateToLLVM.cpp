@@ -29,7 +29,7 @@ static Value createElementNumber(OpBuilder &builder, Location loc,
   return index;
 }
 
-/// How many bytes it is behind the first one.
+/// How many bytes it is after the first one.
 static Value createElementOffset(OpBuilder &builder, Location loc,
                                  ValueRange indices, const StateView &view,
                                  int64_t size) {

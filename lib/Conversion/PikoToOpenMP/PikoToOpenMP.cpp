@@ -73,7 +73,7 @@ private:
     return scf::ForOp::create(rewriter, loc, zero, count, one);
   }
 
-  /// Moves the body in front of the terminator of `to`, whose argument is the
+  /// Moves the body before the terminator of `to`, whose argument is the
   /// unit.
   void moveBody(Block *to) {
     rewriter.eraseOp(forall.getTerminator());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// convert-piko-to-scf: updates and other access to state, behind tests of where
+// convert-piko-to-scf: updates and other access to state, under tests of where
 // they go.
 
 #include "PikoToSCF/Tiles.h"
@@ -66,7 +66,7 @@ private:
   }
 };
 
-/// Puts an access that is not checked yet behind a test of its indices; a read
+/// Puts an access that is not checked yet under a test of its indices; a read
 /// that fails the test gives 0.
 template <typename AccessOp> struct CheckAccess : OpRewritePattern<AccessOp> {
   using OpRewritePattern<AccessOp>::OpRewritePattern;
@@ -112,7 +112,7 @@ private:
   }
 };
 
-/// Puts an integer division behind a test of whether it has a result.
+/// Puts an integer division under a test of whether it has a result.
 struct ConvertDivide : OpRewritePattern<DivideOp> {
   using OpRewritePattern::OpRewritePattern;
 
@@ -202,7 +202,7 @@ struct ConvertListSize : OpRewritePattern<ListSizeOp> {
   }
 };
 
-/// Turns the read of a list into that of a position, behind a test of the index
+/// Turns the read of a list into that of a position, under a test of the index
 /// unless a loop says that it is inside.
 struct ConvertListAt : OpRewritePattern<ListAtOp> {
   using OpRewritePattern::OpRewritePattern;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// A tile is, for each type of numbers, a private array: pixel behind pixel, row
-// behind row. A pixel's numbers lie together, as LLVM forms vectors of what is
+// A tile is, for each type of numbers, a private array: pixel after pixel, row
+// after row. A pixel's numbers lie together, as LLVM forms vectors of what is
 // computed for them where they are stored in a row. Or the tile stays where it
 // is in the image, whose rows are cleared when the bin begins: they are in the
 // cache from then on. Of one that is not cleared the runtime may make a copy.
@@ -286,9 +286,9 @@ static bool mayCompete(ArrayRef<int64_t> extents) {
 }
 
 /// The primitives of the bin at whose start an operation stands.
-static CellRangeOp findRange(Operation *op) {
+static BucketRangeOp findRange(Operation *op) {
   for (; op && !isa<scf::ForallOp>(op); op = op->getParentOp())
-    for (auto range : op->getBlock()->getOps<CellRangeOp>())
+    for (auto range : op->getBlock()->getOps<BucketRangeOp>())
       if (range->isBeforeInBlock(op))
         return range;
   return {};
@@ -298,7 +298,7 @@ static CellRangeOp findRange(Operation *op) {
 /// cleared first is in the cache from then on: it was measured to gain nothing.
 void TileLowering::offerCopy() {
   auto units = tile->getParentOfType<scf::ForallOp>();
-  CellRangeOp range = findRange(tile);
+  BucketRangeOp range = findRange(tile);
   if (!units || !mayCompete(getExtents()) || !range)
     return;
   auto writers = units.getBody()->getOps<OpenWriterOp>();

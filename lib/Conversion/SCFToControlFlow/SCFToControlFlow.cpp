@@ -70,7 +70,7 @@ struct ConvertSCFToControlFlowInReverse
       }
   }
 
-  /// Structured control flow, the last in a block first: what is behind it is
+  /// Structured control flow, the last in a block first: what is after it is
   /// then no more than a branch and what follows up to the next.
   llvm::SmallVector<Operation *> collect() {
     llvm::SmallVector<Operation *> found;

@@ -69,7 +69,7 @@ bool expandLocalAtomics(llvm::Function &function, const ParsedUnit &unit,
                         MemoryMap &memory, mlir::MLIRContext &context,
                         bool &changed);
 
-/// Refuses what is done with an update's pixel behind the update, and no longer
+/// Refuses what is done with an update's pixel after the update, and no longer
 /// keeps in memory those of which all is known, or `all`; false after an error.
 bool releasePixels(llvm::Function &function, const ParsedUnit &unit,
                    MemoryMap &memory, mlir::MLIRContext &context, bool all,

@@ -6,7 +6,7 @@
 //
 //   memmove(to, from, 8 * n)   ->   for k in 0 .. n: to[k] = from[k]
 //
-// or from the last element to the first one where `to` lies behind `from`. An
+// or from the last element to the first one where `to` lies after `from`. An
 // element is as long as a step along both arrays that divides the length.
 //
 //===----------------------------------------------------------------------===//
@@ -141,7 +141,7 @@ private:
   }
 
   /// Whether the standard library made it, of an array's elements: a user's own
-  /// may go on behind the array.
+  /// may go on after the array.
   bool isOfElements(const llvm::MemIntrinsic *copy) const {
     const llvm::DILocation *at = copy->getDebugLoc();
     return at && unit.programNames.lookup(at->getScope()->getSubprogram())

@@ -1,10 +1,10 @@
-//===- KeptPixels.cpp - References to pixels behind their update ----------===//
+//===- KeptPixels.cpp - References to pixels after their update ----------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The pixel of an update is a local variable, which is written back when the
 // update ends: what is done through a reference that was kept would be lost. It
 // stays in memory, held by a call, until it is known which loads and stores are
-// to it. None of them may come behind the end of the update.
+// to it. None of them may come after the end of the update.
 //
 //===----------------------------------------------------------------------===//
 
@@ -77,10 +77,10 @@ static bool findAccesses(llvm::Value *pointer, HeldPixel &pixel,
   return isKnown;
 }
 
-/// An access behind an end, on some way that does not lead into the next
+/// An access after an end, on some way that does not lead into the next
 /// update; null if there is none.
-static const llvm::Instruction *findBehind(const llvm::CallInst *end,
-                                           const HeldPixel &pixel) {
+static const llvm::Instruction *findAfter(const llvm::CallInst *end,
+                                          const HeldPixel &pixel) {
   llvm::SmallPtrSet<const llvm::BasicBlock *, 8> visited;
   llvm::SmallVector<const llvm::Instruction *> work{end->getNextNode()};
   while (!work.empty()) {
@@ -116,7 +116,7 @@ bool piko::releasePixels(llvm::Function &function, const ParsedUnit &unit,
     if (!findAccesses(base, pixel, memory) && !all)
       continue;
     for (llvm::CallInst *end : pixel.ends)
-      if (const llvm::Instruction *kept = findBehind(end, pixel)) {
+      if (const llvm::Instruction *kept = findAfter(end, pixel)) {
         mlir::InFlightDiagnostic error =
             mlir::emitError(getUserLocation(kept, unit, context))
             << "expected a pixel to be used inside its update, but this "

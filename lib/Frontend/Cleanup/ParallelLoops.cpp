@@ -123,7 +123,7 @@ int64_t piko::getOwner(const llvm::AllocaInst *variable) {
 
 std::string piko::getVariableName(const llvm::AllocaInst *variable) {
   // Inlining appends ".i"; Clang's own variables have a dot in their names,
-  // and those of one name in several scopes a number behind it.
+  // and those of one name in several scopes a number after it.
   llvm::StringRef name = variable->getName();
   while (name.contains('.') && name.rsplit('.').second.starts_with("i") &&
          llvm::all_of(name.rsplit('.').second.drop_front(), llvm::isDigit))

@@ -35,8 +35,8 @@ public:
 private:
   /// How often the loop comes to its condition; 0 if that is unknown, or too
   /// often.
-  unsigned countTurns(llvm::Loop &loop);
-  bool unroll(llvm::Loop &loop, unsigned turns);
+  unsigned countIterations(llvm::Loop &loop);
+  bool unroll(llvm::Loop &loop, unsigned iterations);
 
   llvm::Function &function;
   llvm::DominatorTree dominance;
@@ -57,30 +57,30 @@ static bool canRepeat(const llvm::Instruction &instruction) {
          (call->doesNotAccessMemory() && call->doesNotThrow());
 }
 
-/// As many turns as a vector has components, with little to do, and no pointer
-/// that walks, which is an index as long as it does so in a loop. The last time
-/// that the loop comes to its condition is counted, too.
-unsigned Unroller::countTurns(llvm::Loop &loop) {
-  constexpr unsigned mostTurns = 4 + 1, mostInstructions = 80;
-  unsigned turns = counts.getSmallConstantTripCount(&loop), size = 0;
+/// As many iterations as a vector has components, with little to do, and no
+/// pointer that walks, which is an index as long as it does so in a loop. The
+/// last time that the loop comes to its condition is counted, too.
+unsigned Unroller::countIterations(llvm::Loop &loop) {
+  constexpr unsigned mostIterations = 4 + 1, mostInstructions = 80;
+  unsigned iterations = counts.getSmallConstantTripCount(&loop), size = 0;
   bool walks = llvm::any_of(loop.getHeader()->phis(), [](llvm::PHINode &phi) {
     return phi.getType()->isPointerTy();
   });
-  if (!loop.isInnermost() || turns > mostTurns || walks)
+  if (!loop.isInnermost() || iterations > mostIterations || walks)
     return 0;
   for (const llvm::BasicBlock *block : loop.blocks())
     for (const llvm::Instruction &instruction : *block)
       if (!canRepeat(instruction) || ++size > mostInstructions)
         return 0;
-  return turns;
+  return iterations;
 }
 
-bool Unroller::unroll(llvm::Loop &loop, unsigned turns) {
+bool Unroller::unroll(llvm::Loop &loop, unsigned iterations) {
   llvm::simplifyLoop(&loop, &dominance, &loops, &counts, &assumptions,
                      /*MSSAU=*/nullptr, /*PreserveLCSSA=*/false);
   llvm::formLCSSARecursively(loop, dominance, &loops, &counts);
   llvm::UnrollLoopOptions options{};
-  options.Count = turns;
+  options.Count = iterations;
   options.Force = true;
   options.ForgetAllSCEV = true;
   llvm::TargetTransformInfo target(function.getParent()->getDataLayout());
@@ -95,8 +95,8 @@ bool Unroller::run() {
   bool any = false;
   llvm::SmallVector<llvm::Loop *> all = loops.getLoopsInPreorder();
   for (llvm::Loop *loop : all)
-    if (unsigned turns = countTurns(*loop))
-      any |= unroll(*loop, turns);
+    if (unsigned iterations = countIterations(*loop))
+      any |= unroll(*loop, iterations);
   return any;
 }
 

@@ -4,7 +4,7 @@
 // The function that an update, a reduction or a scan is given has been inlined
 // between a call that gives its arguments and one that takes its result. What
 // is between them becomes the operation's region; what does not need to be
-// there is moved in front.
+// there is moved before.
 //
 //===----------------------------------------------------------------------===//
 
@@ -149,7 +149,7 @@ bool Bracket::isUsedAfter(mlir::Value value) {
   });
 }
 
-/// Whether an operation may run in front of what it is between. An update runs
+/// Whether an operation may run before what it is between. An update runs
 /// once; a loop may run no iteration, and then nothing may be read at an index
 /// that is not known to be inside.
 bool Bracket::isHoistable(mlir::Operation &op) {

@@ -239,7 +239,8 @@ llvm::SmallVector<mlir::Value> PhaseImporter::getCoordinates(
 }
 
 LogicalResult PhaseImporter::getPlace(llvm::CallInst *call,
-                                      unsigned firstElement, Place &place) {
+                                      unsigned firstElement,
+                                      MemoryPlace &place) {
   auto *base = cast<llvm::CallInst>(call->getArgOperand(0));
   unsigned leaf =
       cast<llvm::ConstantInt>(call->getArgOperand(1))->getZExtValue();
@@ -346,7 +347,7 @@ LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
 }
 
 LogicalResult PhaseImporter::importLoad(llvm::CallInst *call) {
-  Place place;
+  MemoryPlace place;
   if (failed(getPlace(call, 2, place)))
     return failure();
   mlir::Type type = scalars.getType(call->getType());
@@ -367,7 +368,7 @@ LogicalResult PhaseImporter::importLoad(llvm::CallInst *call) {
 }
 
 LogicalResult PhaseImporter::importStore(llvm::CallInst *call) {
-  Place place;
+  MemoryPlace place;
   if (failed(getPlace(call, 3, place)))
     return failure();
   make<StoreOp>(scalars.get(call->getArgOperand(2)), place.state->name,
@@ -408,7 +409,7 @@ LogicalResult PhaseImporter::expectUnordered(llvm::CallInst *call,
 }
 
 LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
-  Place place;
+  MemoryPlace place;
   if (failed(getPlace(call, 5, place)))
     return failure();
   AtomicKind kind = getAtomicKind(call);

@@ -218,7 +218,7 @@ private:
         static_cast<ScheduleKind>(schedule.getPolicy()),
         number(schedule.tileSplit),
         waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
-        schedule.endBin, /*behind=*/false, number(schedule.batch),
+        schedule.endBin, /*after=*/false, number(schedule.batch),
         schedule.everyBin, schedule.unordered, /*resolved=*/false, lanes);
     return !schedule.isDynamic ||
            buildPhase(WrapperKind::Schedule, stageNumber, op.getBody());

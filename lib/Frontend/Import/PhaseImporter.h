@@ -76,7 +76,7 @@ private:
                                      unsigned count);
 
   // ImportMemory.cpp: local arrays, state and primitives.
-  struct Place {
+  struct MemoryPlace {
     const StateDescription *state = nullptr; ///< null = a primitive
     mlir::Value prim;
     llvm::SmallVector<mlir::Value> indices, elements;
@@ -93,7 +93,7 @@ private:
   getCoordinates(llvm::iterator_range<llvm::User::op_iterator> operands,
                  int64_t rank);
   llvm::LogicalResult getPlace(llvm::CallInst *call, unsigned firstElement,
-                               Place &place);
+                               MemoryPlace &place);
   llvm::LogicalResult importAccessor(llvm::CallInst *call,
                                      llvm::StringRef name);
   llvm::LogicalResult importLoad(llvm::CallInst *call);
@@ -135,7 +135,7 @@ private:
   std::optional<mlir::Location> location;
   mlir::OwningOpRef<mlir::func::FuncOp> function;
   mlir::Block *entry = nullptr;
-  /// A loop's header is the block in front of it, with the operation.
+  /// A loop's header is the block before it, with the operation.
   llvm::DenseMap<llvm::BasicBlock *, mlir::Block *> blocks;
   llvm::DenseMap<const ParallelLoop *, LoopRegion> loopRegions;
   /// The first block of the loop over pixels whose counter it is.

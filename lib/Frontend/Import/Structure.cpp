@@ -64,7 +64,7 @@ public:
       mlir::Value again, mlir::ValueRange next, mlir::Region &&body) override {
     std::optional<double> known;
     if (auto flag = mlir::dyn_cast<mlir::BlockArgument>(again))
-      known = computeTurnProbability(&body.front(), flag);
+      known = computeIterationProbability(&body.front(), flag);
     auto made = ControlFlowToSCFTransformation::createStructuredDoWhileLoopOp(
         builder, branch, inits, again, next, std::move(body));
     if (llvm::succeeded(made))
@@ -85,7 +85,7 @@ public:
   mlir::scf::ExecuteRegionOp wrap();
 
 private:
-  /// Whether it goes on behind a block.
+  /// Whether it goes on after a block.
   bool visit(mlir::Block *block, mlir::Block::iterator from);
   bool isInside(mlir::Operation *user) const;
 

@@ -26,7 +26,7 @@ using mlir::InFlightDiagnostic;
 
 namespace {
 
-/// Tells which blocks run once, behind and beside loops that fill members.
+/// Tells which blocks run once, after and beside loops that fill members.
 class Once {
 public:
   explicit Once(llvm::Function &function)

@@ -49,7 +49,7 @@ static void refuse(const clang::FunctionDecl *function,
   mlir::Diagnostic &note = error.attachNote();
   if (name == "emit")
     note << "with Qt, define QT_NO_KEYWORDS; else ";
-  note << "write '#undef " << name << "' in front of the pipeline";
+  note << "write '#undef " << name << "' before the pipeline";
 }
 
 llvm::LogicalResult

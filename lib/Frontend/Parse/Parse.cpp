@@ -154,7 +154,7 @@ struct UnitReader {
   std::unique_ptr<ParsedUnit> unit;
   RecordTable records;
   PipelineReader reader;
-  /// Behind the names of its wrappers.
+  /// After the names of its wrappers.
   std::string suffix;
 };
 
@@ -476,7 +476,7 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   compiler.createFileManager();
   compiler.createSourceManager();
   clang::SourceManager &sources = compiler.getSourceManager();
-  std::string mainText = hasHeader ? getTextBehindHeader(request.options) : "";
+  std::string mainText = hasHeader ? getTextAfterHeader(request.options) : "";
   mainText += "#pragma piko_file\n;\n#pragma piko_wrappers\n";
   sources.setMainFileID(sources.createFileID(
       llvm::MemoryBuffer::getMemBuffer(mainText, mainName)));

@@ -347,8 +347,8 @@ LogicalResult PipelineReader::checkAccess(const clang::NamedDecl *phase,
   std::string name = phase->getNameAsString();
   return emitError(locate(phase->getLocation()))
          << "expected phase '" << name << "' of stage '" << stage.name
-         << "' to be public, because the executor calls it; write 'public:' in "
-            "front of it";
+         << "' to be public, because the executor calls it; write 'public:' "
+            "before it";
 }
 
 LogicalResult PipelineReader::readPhases(const CXXRecordDecl *type,

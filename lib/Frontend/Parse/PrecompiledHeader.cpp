@@ -83,10 +83,10 @@ static llvm::StringRef getFirstDirective(llvm::StringRef text) {
     return "";
   llvm::StringRef rest =
       text.drop_front(lexer.getBufferLocation() - terminated.data());
-  auto [line, behind] = rest.split('\n');
+  auto [line, after] = rest.split('\n');
   line = line.trim();
   return line == "pragma once" || includesStandardHeader(line)
-             ? getFirstDirective(behind)
+             ? getFirstDirective(after)
              : line;
 }
 
@@ -113,7 +113,7 @@ static bool beginsWithHeader(llvm::StringRef path, llvm::vfs::FileSystem &files,
   return beginsWithHeader(beside, files, depth + 1);
 }
 
-/// The names, and behind them the header.
+/// The names, and after them the header.
 static std::optional<std::string> makeHeader(const FrontendOptions &options,
                                              const HeaderStore::Files &files,
                                              InvocationMaker invoke) {
@@ -174,7 +174,7 @@ static bool mentions(llvm::StringRef names,
   });
 }
 
-std::string piko::getTextBehindHeader(const FrontendOptions &options) {
+std::string piko::getTextAfterHeader(const FrontendOptions &options) {
   if (!isTuned(options))
     return "";
   return "template <> inline constexpr const char "

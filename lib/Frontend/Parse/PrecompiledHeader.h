@@ -34,9 +34,9 @@ getPrecompiledHeader(llvm::StringRef file, const FrontendOptions &options,
 /// The options that the header for a file with `options` is made with.
 FrontendOptions getHeaderOptions(const FrontendOptions &options);
 
-/// What to put in front of a text for which there is such a header, and which
+/// What to put before a text for which there is such a header, and which
 /// may have PIKO_TUNED.
-std::string getTextBehindHeader(const FrontendOptions &options);
+std::string getTextAfterHeader(const FrontendOptions &options);
 
 } // namespace piko
 

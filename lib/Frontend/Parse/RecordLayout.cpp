@@ -216,7 +216,7 @@ LogicalResult RecordTable::flatten(QualType type, const Path &path,
   return success();
 }
 
-/// Behind the class's fields.
+/// After the class's fields.
 void RecordTable::addClass(const clang::RecordDecl *decl, const Path &path,
                            RecordDescription &record) {
   CppTypeDescription type = describeClass(decl, ast);

@@ -43,13 +43,13 @@ void CallChain::add(const llvm::DILocation *at, llvm::StringRef callee) {
   frames.push_back({at, callee.str()});
 }
 
-bool CallChain::isUsers(const Frame &frame) const {
+bool CallChain::isUsers(const CallSite &frame) const {
   return frame.at && ::isUsers(frame.at, unit);
 }
 
 size_t CallChain::findUserFrame() const {
   return llvm::find_if(frames,
-                       [&](const Frame &frame) { return isUsers(frame); }) -
+                       [&](const CallSite &frame) { return isUsers(frame); }) -
          frames.begin();
 }
 
@@ -71,10 +71,10 @@ static bool isOurs(llvm::StringRef function) {
   return function.starts_with("piko::");
 }
 
-void CallChain::attachCallsBehind(mlir::InFlightDiagnostic &error, size_t place,
-                                  mlir::MLIRContext &context) const {
+void CallChain::attachCallsAfter(mlir::InFlightDiagnostic &error, size_t place,
+                                 mlir::MLIRContext &context) const {
   for (size_t i = place; i-- > 0;) {
-    const Frame &frame = frames[i];
+    const CallSite &frame = frames[i];
     llvm::StringRef function = frames[i + 1].callee;
     if (!frame.at || frame.at->getLine() == 0 || function.empty() ||
         isOurs(function) || isOurs(frame.callee))
@@ -90,7 +90,7 @@ void CallChain::attachCallsBehind(mlir::InFlightDiagnostic &error, size_t place,
 void CallChain::attachCallers(mlir::InFlightDiagnostic &error, size_t place,
                               mlir::MLIRContext &context) const {
   // What a parallelFor runs is written where it is called.
-  for (const Frame &frame : llvm::drop_begin(frames, place + 1))
+  for (const CallSite &frame : llvm::drop_begin(frames, place + 1))
     if (isUsers(frame) && !isOurs(frame.callee))
       error.attachNote(convert(frame.at, context)) << "called from here";
 }
@@ -102,7 +102,7 @@ CallChain::emitError(mlir::MLIRContext &context) const {
   if (place == frames.size())
     return error;
   attachCallers(error, place, context);
-  attachCallsBehind(error, place, context);
+  attachCallsAfter(error, place, context);
   return error;
 }
 

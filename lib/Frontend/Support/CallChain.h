@@ -34,20 +34,20 @@ public:
   mlir::InFlightDiagnostic emitError(mlir::MLIRContext &context) const;
 
 private:
-  struct Frame {
+  struct CallSite {
     const llvm::DILocation *at;
     std::string callee;
   };
-  bool isUsers(const Frame &frame) const;
+  bool isUsers(const CallSite &frame) const;
   /// The place of the error: the innermost in the user's text.
   size_t findUserFrame() const;
-  void attachCallsBehind(mlir::InFlightDiagnostic &error, size_t place,
-                         mlir::MLIRContext &context) const;
+  void attachCallsAfter(mlir::InFlightDiagnostic &error, size_t place,
+                        mlir::MLIRContext &context) const;
   void attachCallers(mlir::InFlightDiagnostic &error, size_t place,
                      mlir::MLIRContext &context) const;
 
   const ParsedUnit &unit;
-  std::vector<Frame> frames;
+  std::vector<CallSite> frames;
 };
 
 /// Where the user's text says what an instruction does.

@@ -9,7 +9,7 @@ using namespace llvm;
 
 static constexpr unsigned registerBits = 512;
 
-/// Stores some lanes one behind the other, and gives back where the next ones
+/// Stores some lanes one after the other, and gives back where the next ones
 /// go.
 static Value *write(IRBuilder<> &builder, Value *lanes, Value *to,
                     MaybeAlign alignment, Value *mask) {

@@ -2,8 +2,8 @@
 //
 // All but the back end of what a GPU would run: the kernels' LLVM IR as it is,
 // with the functions that only a GPU has given by the emulator (pikort/grid.h).
-// Address spaces are the CPU's one; a block's memory is a variable, because
-// blocks run one after the other.
+// Address spaces are the CPU's one; a block's shared memory is a variable,
+// because blocks run one after the other.
 
 #include "Piko/Target/Emulate.h"
 

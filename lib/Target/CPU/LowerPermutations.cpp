@@ -30,7 +30,7 @@ constexpr WordPermutation wordPermutations[] = {
 /// Writes what stands for one permutation.
 class PermutationWriter {
 public:
-  /// In front of the call.
+  /// Before the call.
   PermutationWriter(CallInst *call, const TargetMachine &machine);
   Value *write() { return permute(call->getArgOperand(0)); }
 

@@ -28,7 +28,7 @@ static std::optional<std::pair<Value *, uint64_t>> findLane(StoreInst &store) {
   return std::pair(extract->getVectorOperand(), lane->getZExtValue());
 }
 
-/// Takes groups of lanes out of the vector in front of the first store.
+/// Takes groups of lanes out of the vector before the first store.
 static void replace(Value *vector, const Stores &stores) {
   auto *type = cast<FixedVectorType>(vector->getType());
   uint64_t bits = type->getScalarSizeInBits(), count = together / bits;

@@ -20,13 +20,13 @@ static constexpr unsigned pointerBits = 64;
 namespace {
 
 /// Where lanes load: what they have in common but for a constant.
-struct Place {
+struct WordPlace {
   const Value *root = nullptr;
   SmallVector<std::pair<const Value *, APInt>, 2> terms; ///< with their factors
   int64_t offset = 0;                                    ///< in bytes
 
   void add(const Value *term, APInt factor);
-  bool isApartFrom(const Place &other) const {
+  bool isApartFrom(const WordPlace &other) const {
     return root == other.root && terms.size() == other.terms.size() &&
            all_of(terms,
                   [&](const auto &t) { return is_contained(other.terms, t); });
@@ -36,7 +36,7 @@ struct Place {
 /// Gathers between which nothing is written, by their distance from the first
 /// one. Of several of one word, each is here.
 struct Group {
-  Place place; ///< of the first
+  WordPlace place; ///< of the first
   IntrinsicInst *first;
   std::map<int64_t, SmallVector<IntrinsicInst *, 1>> words;
 };
@@ -47,7 +47,7 @@ public:
   explicit TransposeWriter(const Group &group)
       : group(group), type(cast<FixedVectorType>(group.first->getType())),
         lanes(type->getNumElements()) {}
-  /// Whether words `begin` and the three behind it take fewer cycles so.
+  /// Whether words `begin` and the three after it take fewer cycles so.
   bool paysAt(int64_t begin) const;
   void write(int64_t begin);
   bool isDone(int64_t word) const { return done.count(word) != 0; }
@@ -67,7 +67,7 @@ private:
 } // namespace
 
 /// A sum with a constant is two terms: addresses are numbers modulo 2^64.
-void Place::add(const Value *term, APInt factor) {
+void WordPlace::add(const Value *term, APInt factor) {
   const APInt *constant;
   const Value *rest;
   while (match(term, m_Add(m_Value(rest), m_APInt(constant))) &&
@@ -85,9 +85,9 @@ void Place::add(const Value *term, APInt factor) {
     terms.emplace_back(term, factor);
 }
 
-static Place findPlace(const IntrinsicInst *gather) {
+static WordPlace findPlace(const IntrinsicInst *gather) {
   const DataLayout &layout = gather->getDataLayout();
-  Place place;
+  WordPlace place;
   place.root = gather->getArgOperand(0);
   while (auto *address = dyn_cast<GEPOperator>(place.root)) {
     SmallMapVector<Value *, APInt, 4> variables;
@@ -113,7 +113,7 @@ static bool isOfAllWords(const IntrinsicInst *gather) {
 
 static void addGather(IntrinsicInst *gather, SmallVectorImpl<Group> &groups,
                       size_t firstOpen) {
-  Place place = findPlace(gather);
+  WordPlace place = findPlace(gather);
   for (Group &group : drop_begin(groups, firstOpen)) {
     int64_t distance = place.offset - group.place.offset;
     if (distance % wordSize == 0 && place.isApartFrom(group.place) &&

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// LLVM's loop vectorizer makes a gather of each word that a turn of a loop
-// loads from a record, or from a short array in it. Here each lane loads words
-// side by side at once, four of them, and blocks of 4 x 4 words are transposed:
-// a gather takes an access for each lane and word.
+// LLVM's loop vectorizer makes a gather of each word that an iteration of a
+// loop loads from a record, or from a short array in it. Here each lane loads
+// words side by side at once, four of them, and blocks of 4 x 4 words are
+// transposed: a gather takes an access for each lane and word.
 
 #ifndef PIKO_TARGET_CPU_TRANSPOSEGATHERS_H
 #define PIKO_TARGET_CPU_TRANSPOSEGATHERS_H
@@ -12,7 +12,7 @@
 
 namespace piko {
 
-/// Of gathers in a block by all lanes, for processors with AVX2. To run behind
+/// Of gathers in a block by all lanes, for processors with AVX2. To run after
 /// the optimizer.
 struct TransposeGathersPass : ProcessorPass<TransposeGathersPass> {
   using ProcessorPass::ProcessorPass;

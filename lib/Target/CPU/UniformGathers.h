@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// LLVM's loop vectorizer makes a gather of what a turn of a loop loads behind a
-// condition, also where all turns load from one place: nothing says that memory
-// is there if no turn's condition holds. A gather takes an access for each
-// lane, though all are the same. Here one masked load does it, for all lanes.
+// LLVM's loop vectorizer makes a gather of what an iteration of a loop loads
+// under a condition, also where all iterations load from one place: nothing
+// says that memory is there if no iteration's condition holds. A gather takes
+// an access for each lane, though all are the same. Here one masked load does
+// it, for all lanes.
 
 #ifndef PIKO_TARGET_CPU_UNIFORMGATHERS_H
 #define PIKO_TARGET_CPU_UNIFORMGATHERS_H

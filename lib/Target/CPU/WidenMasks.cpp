@@ -39,7 +39,7 @@ static void spread(Instruction *mask, Value *wide) {
   }
 }
 
-/// A phi of the wide form, and the mask behind it.
+/// A phi of the wide form, and the mask after it.
 static void widen(PHINode *phi) {
   IRBuilder<> builder(phi);
   PHINode *wide =

@@ -61,7 +61,8 @@ static void defineList(Module &host, GlobalVariable *declared,
   declared->eraseFromParent();
 }
 
-/// A block's memory is declared in PTX, and 48 KB is what drivers give to that.
+/// A block's shared memory is declared in PTX, and 48 KB is what drivers give
+/// to that.
 static Error checkBlockMemory(const Module &module) {
   constexpr int64_t most = 48 << 10;
   for (const KernelResources &kernel : findKernels(module))

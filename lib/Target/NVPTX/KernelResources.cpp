@@ -114,7 +114,7 @@ std::vector<KernelResources> piko::findKernels(const Module &module) {
 // From the assembler
 //===----------------------------------------------------------------------===//
 
-/// The number in front of `what` in a line.
+/// The number before `what` in a line.
 static int64_t getNumberBefore(StringRef line, StringRef what) {
   int64_t number = 0;
   StringRef before = line.take_front(line.find(what)).rtrim();

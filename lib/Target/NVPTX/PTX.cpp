@@ -39,7 +39,7 @@ Error piko::checkChip(StringRef chip) {
 }
 
 /// What asks which lanes are active came with PTX 6.2; every driver that knows
-/// CUDA 10 takes 6.3. LLVM has less for chips in front of sm_75.
+/// CUDA 10 takes 6.3. LLVM has less for chips before sm_75.
 static StringRef getFeatures(StringRef processor) {
   unsigned chip = 0;
   processor.consume_front("sm_");

@@ -37,7 +37,7 @@ bool piko::hasProcessor(const Target &target, const Triple &triple,
 /// What LLVM finds by looking at pairs, of blocks or of live ranges, takes time
 /// that grows with the square of a function. Of functions of more instructions
 /// than these, far more than people write, it is left out: before they are
-/// optimized, and behind that.
+/// optimized, and after that.
 static constexpr unsigned hugeText = 40000, hugeFunction = 15000;
 
 static bool hasFunctionAbove(const Module &module, unsigned instructions) {

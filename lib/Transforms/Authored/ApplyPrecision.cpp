@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-apply-precision: for each process phase that need not be strict,
-//   1. of divisions and square roots in f32, make approximations;
-//   2. make additions of products math.fma.
+//   1. of divisions and square roots in f32, make approximations; piko::rsqrt,
+//      which computes in f64, is recognised. The reciprocal of a constant is
+//      the nearest number, unless that has fewer bits;
+//   2. make additions of products math.fma, whether or not a product is used
+//      elsewhere, and also if both sides of a condition yield one. Of two
+//      products the left one is fused.
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
@@ -168,7 +172,7 @@ static Value splitProduct(OpResult result, scf::IfOp choice) {
 }
 
 /// Products that leave a condition as such can be contracted with what is added
-/// behind it.
+/// after it.
 static void splitProducts(ProcessOp process) {
   SmallVector<scf::IfOp> choices;
   process.getBody().walk([&](scf::IfOp choice) {

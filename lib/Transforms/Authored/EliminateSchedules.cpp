@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-eliminate-schedules: load balancing is what a parallel loop over bins
-// does by itself, so that no scheduler is asked for it.
+// piko-eliminate-schedules: erases schedules that say no more than load
+// balancing, which a stage without a schedule has, too.
 
 #include "Authored/Schedules.h"
 

@@ -41,7 +41,7 @@ struct FuseStagesPass : piko::impl::FuseStagesBase<FuseStagesPass> {
   }
   LogicalResult check(EdgeOp edge, StageOp host, Refusal &refusal);
   bool emitsFurther(StageOp stage, StageOp host);
-  bool runsBetterBehind(EdgeOp edge);
+  bool runsBetterAfter(EdgeOp edge);
 };
 
 /// Makes a stage part of the one that feeds it.
@@ -123,8 +123,8 @@ static LogicalResult checkSchedules(StageOp producer, StageOp consumer,
   return success();
 }
 
-/// The loop around an operation in whose turns an assignment would count once
-/// for all, or null.
+/// The loop around an operation in whose iterations an assignment would count
+/// once for all, or null.
 static Operation *getLoopAround(Operation *op) {
   for (Operation *parent = op->getParentOp(); !isa<AssignOp>(parent);
        parent = parent->getParentOp())
@@ -154,8 +154,8 @@ LogicalResult FuseStagesPass::check(EdgeOp edge, StageOp host,
   if (consumer.collects())
     return refuse(consumer, "it waits until no primitive can reach it");
   if (ScheduleOp schedule = consumer.getSchedule();
-      schedule && schedule.getBehind())
-    return refuse(consumer, "its loops fill vectors behind the other");
+      schedule && schedule.getAfter())
+    return refuse(consumer, "its loops fill vectors after the other");
   if (failed(checkSchedules(producer.getSchedule() ? producer : host, consumer,
                             refusal)))
     return failure();
@@ -238,11 +238,11 @@ static bool staysInBin(StageOp stage) {
   });
 }
 
-/// Whether a consumer that can be fused is better run behind its producer, bin
+/// Whether a consumer that can be fused is better run after its producer, bin
 /// by bin: loops of what is emitted in a loop are run for the few iterations
 /// that emit at a time, and lanes of a vector have nothing to do; from a list
 /// they are full. What only ends in pixels has piko-defer-shading for that.
-bool FuseStagesPass::runsBetterBehind(EdgeOp edge) {
+bool FuseStagesPass::runsBetterAfter(EdgeOp edge) {
   auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
   auto consumer = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
   if (producer.isWholeDomain() || !hasLoop(consumer.getProcess()) ||
@@ -271,8 +271,8 @@ bool FuseStagesPass::runsBetterBehind(EdgeOp edge) {
          emitsFurther(consumer, producer);
 }
 
-/// Lets a stage run behind its producer, on the same core.
-static void runBehind(StageOp stage, StageOp producer) {
+/// Lets a stage run after its producer, on the same core.
+static void runAfter(StageOp stage, StageOp producer) {
   ScheduleOp schedule = stage.getSchedule();
   OpBuilder builder(stage.getProcess());
   auto unit = builder.getUnitAttr();
@@ -283,11 +283,11 @@ static void runBehind(StageOp stage, StageOp producer) {
         getAskedKind(producer).value_or(ScheduleKind::LoadBalance));
     schedule = ScheduleOp::create(
         builder, stage.getLoc(), kind, /*tileSplit=*/nullptr,
-        /*endStage=*/nullptr, /*endBin=*/nullptr, /*behind=*/nullptr,
+        /*endStage=*/nullptr, /*endBin=*/nullptr, /*after=*/nullptr,
         /*batch=*/nullptr, /*everyBin=*/nullptr, /*unordered=*/nullptr,
         before ? before.getResolvedAttr() : nullptr, /*lanes=*/nullptr);
   }
-  schedule.setBehindAttr(unit);
+  schedule.setAfterAttr(unit);
 }
 
 //===----------------------------------------------------------------------===//
@@ -467,8 +467,8 @@ void FuseStagesPass::runOnOperation() {
         Refusal refusal;
         if (failed(check(edge, refusal)))
           continue;
-        if (fission && runsBetterBehind(edge)) {
-          runBehind(consumer, producer);
+        if (fission && runsBetterAfter(edge)) {
+          runAfter(consumer, producer);
           consumer.emitRemark()
               << "stage '" << getCppName(consumer) << "' takes what stage '"
               << getCppName(producer)

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-infer-directives: writes down directives that hold without being said.
+// BinIdentity proves them. Its inequalities (LinearFacts) are of loops and how
+// their arguments change from iteration to iteration, of conditions on the way,
+// minima and maxima, quotients, remainders, shifts and masks, of floats that
+// are whole numbers, of truth values, and of how the producer's own bin was
+// chosen, for the primitive or for each one of a list that it reads at an index
+// in the list. Arithmetic that may wrap around proves nothing: of hi + 1 with
+// any hi nothing is known, of min(hi, end - 1) + 1 all.
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"

@@ -7,10 +7,10 @@
 //   2. an scf.if whose first arm does nothing has its arms exchanged;
 //   3. a flag that arms yield as a number becomes a truth value;
 //   4. a truth value that one arm yields, where the other yields false, becomes
-//      a conjunction in front;
+//      a conjunction before it;
 //   5. an scf.if in another, where both yield the same otherwise, becomes one;
-//   6. an scf.while whose work stands in front of its condition, in an scf.if
-//      with that condition, has it behind.
+//   6. an scf.while whose work stands before its condition, in an scf.if
+//      with that condition, has it after.
 
 #include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
@@ -233,7 +233,7 @@ bool isHarmless(Operation *op) {
   return isPure(op) && op->getNumRegions() == 0;
 }
 
-/// Collects what must be moved out of an arm for a value to be known in front;
+/// Collects what must be moved out of an arm for a value to be known before;
 /// false if something cannot.
 bool collectSlice(Value value, Region &arm,
                   llvm::SetVector<Operation *> &slice) {
@@ -252,7 +252,7 @@ bool collectSlice(Value value, Region &arm,
 }
 
 /// scf.if %c { .. yield %d } else { yield false }  =>  %c & %d, where %d can be
-/// computed in front.
+/// computed before.
 struct HoistConjunction : OpRewritePattern<scf::IfOp> {
   using OpRewritePattern::OpRewritePattern;
   LogicalResult matchAndRewrite(scf::IfOp choice,
@@ -346,7 +346,7 @@ struct MergeNested : OpRewritePattern<scf::IfOp> {
 
 /// scf.while { .. scf.if %c { work } scf.condition(%c) } do { rest }
 /// =>  scf.while { .. scf.condition(%c) } do { work rest }
-struct MoveWorkBehind : OpRewritePattern<scf::WhileOp> {
+struct MoveWorkAfter : OpRewritePattern<scf::WhileOp> {
   using OpRewritePattern::OpRewritePattern;
   LogicalResult matchAndRewrite(scf::WhileOp loop,
                                 PatternRewriter &rewriter) const override {
@@ -368,7 +368,7 @@ struct MoveWorkBehind : OpRewritePattern<scf::WhileOp> {
 void NormalizeLoopsPass::runOnOperation() {
   RewritePatternSet patterns(&getContext());
   patterns.add<JoinConditions, InvertComparisons, ExchangeArms, TestFlags,
-               NarrowFlags, HoistConjunction, MergeNested, MoveWorkBehind>(
+               NarrowFlags, HoistConjunction, MergeNested, MoveWorkAfter>(
       &getContext());
   scf::IfOp::getCanonicalizationPatterns(patterns, &getContext());
   scf::WhileOp::getCanonicalizationPatterns(patterns, &getContext());

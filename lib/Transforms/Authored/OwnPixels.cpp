@@ -133,7 +133,7 @@ void OwnPixelsPass::runOnStage(StageOp stage) {
 
   AssignOp assign = getOrCreateAssign(stage);
   Block &body = assign.getBody().front();
-  // In front of the assignments, which need the owner.
+  // Before the assignments, which need the owner.
   OpBuilder builder(&body, body.begin());
   IRMapping mapping;
   mapping.map(process.getBody().getArgument(0), body.getArgument(0));

@@ -106,7 +106,7 @@ static void findCarried(scf::WhileOp loop, BlockArgument before,
   for (Value value : loop.getResults())
     if (!value.use_empty())
       refuse(*value.getUsers().begin(),
-             "this reads, behind the loop, what its last iteration left");
+             "this reads, after the loop, what its last iteration left");
   for (Operation &op : loop.getBeforeBody()->without_terminator())
     if (!isPure(&op))
       refuse(&op, "this is done by the test of the loop");

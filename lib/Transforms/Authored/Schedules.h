@@ -9,9 +9,8 @@ namespace piko {
 /// Whether a schedule says more than which core takes a bin.
 inline bool saysMoreThanCore(ScheduleOp schedule) {
   return schedule.getEndStageAttr() || schedule.getEndBin() ||
-         schedule.getBehind() || schedule.getBatch() ||
-         schedule.getEveryBin() || schedule.getUnordered() ||
-         schedule.getLanes();
+         schedule.getAfter() || schedule.getBatch() || schedule.getEveryBin() ||
+         schedule.getUnordered() || schedule.getLanes();
 }
 
 } // namespace piko

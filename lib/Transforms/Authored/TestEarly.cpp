@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-test-early: moves work behind the test that decides whether it is
+// piko-test-early: moves work under the test that decides whether it is
 // needed.
 
 #include "Support/StateAccess.h"

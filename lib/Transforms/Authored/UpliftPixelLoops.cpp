@@ -3,7 +3,7 @@
 // piko-uplift-pixel-loops, for each nest of as many counted loops as the
 // pipeline has dimensions, outermost loops first:
 //   1. find the counters and the bounds of the loops;
-//   2. prove that the counters are a pixel of the bin, if need be behind a test
+//   2. prove that the counters are a pixel of the bin, if need be under a test
 //      around the whole body;
 //   3. check that iterations are independent, and that nothing but them has an
 //      effect;
@@ -95,7 +95,7 @@ static Refusal findPassed(const PixelLoops &loops, FactsProvider &provider) {
 // Rewriting
 //===----------------------------------------------------------------------===//
 
-/// A bound in front of the loops.
+/// A bound before the loops.
 Value Uplift::hoist(Value bound) {
   SetVector<Operation *> slice;
   loops.collectInvariant(bound, slice);
@@ -122,7 +122,7 @@ Value Uplift::createLower(unsigned dim) {
                                 createCorner(/*isUpper=*/false, dim));
 }
 
-/// The end behind a last pixel. The loop ends, so that this is not the largest
+/// The end after a last pixel. The loop ends, so that this is not the largest
 /// int, unless another bound ends it before, as that of the bin does.
 Value Uplift::createEnd(Value last, bool isOnly, Value inBin) {
   auto number = [&](int64_t value) {
@@ -166,7 +166,7 @@ ParallelPixelsOp Uplift::run() {
     counter.replaceAllUsesWith(
         body->addArgument(counter.getType(), counter.getLoc()));
   }
-  // From the outside in: what stands in front of the inner loop. Behind it are
+  // From the outside in: what stands before the inner loop. After it are
   // only the steps to the next iteration.
   for (unsigned dim = loops.getRank(); dim-- > 0;) {
     Operation *inner = dim ? loops.getLoop(dim - 1).op : nullptr;

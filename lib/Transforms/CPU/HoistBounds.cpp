@@ -2,7 +2,7 @@
 //
 // piko-hoist-bounds: for each nest of loops, outermost first,
 //   1. find the tested accesses;
-//   2. if the range of each index is known in front of the nest, write a test
+//   2. if the range of each index is known before the nest, write a test
 //      there that all are inside;
 //   3. copy the nest, for where they are, with accesses that are not tested.
 // Where a loop is innermost, and each index a sum of what does not change and,
@@ -119,7 +119,7 @@ static bool isInnermost(LoopLikeOpInterface loop) {
               .wasInterrupted();
 }
 
-/// Puts a nest and a copy of it behind a test; what the copy has of the nest.
+/// Puts a nest and a copy of it under a test; what the copy has of the nest.
 static IRMapping version(LoopLikeOpInterface nest, Value test) {
   OpBuilder builder(nest);
   IRMapping mapping;
@@ -237,16 +237,16 @@ Value LoopVersioner::createTest(OpBuilder &builder) {
     known.push_back(place);
     Value sum = createSum(builder, access.sum);
     Value lowest = sum,
-          behind = arith::AddIOp::create(builder, loc, sum, constant(1));
+          after = arith::AddIOp::create(builder, loc, sum, constant(1));
     if (access.sum.counts) {
       lowest = arith::AddIOp::create(builder, loc, sum, first);
-      behind = arith::AddIOp::create(builder, loc, sum, end);
+      after = arith::AddIOp::create(builder, loc, sum, end);
     }
     expect(Predicate::sge, lowest, constant(0));
-    expect(Predicate::sle, behind,
+    expect(Predicate::sle, after,
            ExtentOp::create(builder, loc, place.first.getAttr(), 0));
     // What is computed in 32 bits must be the same number.
-    expect(Predicate::sle, behind, constant(int64_t(1) << 31));
+    expect(Predicate::sle, after, constant(int64_t(1) << 31));
   }
   return all;
 }

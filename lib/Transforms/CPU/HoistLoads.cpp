@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-hoist-loads: what decides in each turn of a loop whether there is
-// another one, and no turn changes, is read once in front of it.
+// piko-hoist-loads: what decides in each iteration of a loop whether there is
+// another one, and no iteration changes, is read once before it.
 
 #include "Piko/Transforms/Passes.h"
 #include "Support/StateAccess.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-if-convert: from the inside out, for each scf.if and
-// scf.index_switch with results whose arms compute next to nothing,
-//   1. move what the arms hold in front;
+// piko-if-convert: from the inside out, for each scf.if and scf.index_switch
+// with results whose arms compute next to nothing,
+//   1. move what the arms hold before it;
 //   2. choose each result by arith.select, with one test for cases of the same
 //      values.
 
@@ -59,7 +59,7 @@ bool IfConvertPass::isCheap(Operation *choice) {
   return operations <= maxOperations && cases <= maxCases;
 }
 
-/// Moves an arm's operations in front of the choice; its values.
+/// Moves an arm's operations before the choice; its values.
 static OperandRange hoist(Region &arm, Operation *choice) {
   Block &block = arm.front();
   Operation *yield = block.getTerminator();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Interval arithmetic when the program runs: the least and the greatest number
-// that an index takes in a nest of loops, computed in front of it.
+// that an index takes in a nest of loops, computed before it.
 
 #ifndef PIKO_LIB_TRANSFORMS_INDEXRANGES_H
 #define PIKO_LIB_TRANSFORMS_INDEXRANGES_H
@@ -32,7 +32,7 @@ public:
   struct Range {
     mlir::Value least, greatest;
   };
-  /// None if an index depends on what is not known in front of the loops.
+  /// None if an index depends on what is not known before the loops.
   std::optional<Range> get(mlir::Value value);
   /// Whether a value has a range; then a division has a result, too.
   bool isKnown(mlir::Value value) const {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-merge-bounds: fields of one element are read, or written, behind one
+// piko-merge-bounds: fields of one element are read, or written, under one
 // test of its index.
 
 #include "Piko/Transforms/Passes.h"
@@ -62,7 +62,7 @@ static bool isShort(LoadOp load) {
   return record && record.getSize() <= lineSize;
 }
 
-/// Whether a read behind conditions is as safe in front of them as another one
+/// Whether a read under conditions is as safe before them as another one
 /// there. They may be what keeps an index inside; so it must be the same.
 static bool readsAlong(LoadOp load, LoadOp first) {
   return isShort(load) && load.getIndices() == first.getIndices() &&
@@ -85,7 +85,7 @@ void MergeBoundsPass::merge(ArrayRef<scf::IfOp> tests) {
                                /*addElseBlock=*/false);
   all.getThenRegion().takeBody(first.getThenRegion());
   all.getElseRegion().takeBody(first.getElseRegion());
-  // The others read behind the first; what they say where they fail, it has
+  // The others read after the first; what they say where they fail, it has
   // said.
   for (scf::IfOp test : tests.drop_front())
     getGuarded(test)->moveBefore(all.thenYield());
@@ -116,7 +116,7 @@ static bool touches(Operation *op, FlatSymbolRefAttr state, StringAttr field,
       .wasInterrupted();
 }
 
-/// Whether what a test guards is the same where another one stands in front of
+/// Whether what a test guards is the same where another one stands before
 /// it.
 static bool isUnchanged(scf::IfOp test, scf::IfOp first) {
   LoadOp load = getGuarded(test);
@@ -152,10 +152,10 @@ void MergeBoundsPass::merge(KernelOp kernel) {
     };
     for (SmallVector<scf::IfOp> &tests : groups) {
       scf::IfOp first = tests.front();
-      bool isBehind = first->getBlock() == test->getBlock() ||
-                      (!isWritten && readsAlong(load, getGuarded(first)) &&
-                       first->getBlock()->findAncestorOpInBlock(*test));
-      if (isBehind && !(isWritten && !isUnchanged(test, first)) &&
+      bool isAfter = first->getBlock() == test->getBlock() ||
+                     (!isWritten && readsAlong(load, getGuarded(first)) &&
+                      first->getBlock()->findAncestorOpInBlock(*test));
+      if (isAfter && !(isWritten && !isUnchanged(test, first)) &&
           llvm::all_of(load->getOperands(),
                        [&](Value value) { return isKnown(value, first); }) &&
           isKnown(test.elseYield().getOperand(0), first)) {
@@ -188,7 +188,7 @@ static SmallVector<StoreOp> getWrites(scf::IfOp test) {
   return writes;
 }
 
-/// Whether what a test guards may be done behind an operation, too, and the
+/// Whether what a test guards may be done after an operation, too, and the
 /// error that it may find be told.
 static bool mayPass(Operation *op, scf::IfOp test, ArrayRef<StoreOp> writes) {
   if (isMemoryEffectFree(op))

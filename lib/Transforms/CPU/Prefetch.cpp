@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-prefetch: what a later primitive refers to is asked for ahead of time.
+// piko-prefetch: what a later primitive refers to is asked for ahead of time,
+// as neither it nor the primitive lies in memory in the order of the bin (S.
+// Ainsworth and T. M. Jones, "Software Prefetching for Indirect Memory
+// Accesses", 2017).
+//
+// Primitives of up to 16 bytes are copied into the order of their bins, and
+// need no prefetch. Where a stage has one bin for all, primitives come as they
+// were made, and neighbours mostly refer to the same.
 
 #include "CPU/PrefetchRows.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -144,7 +151,7 @@ static bool areScattered(ItemOp item) {
   StageOp stage = getStage(item);
   WalkResult result = getPipeline(item)->walk([&](AppendBinOp place) {
     bool isSame =
-        isa_and_present<CellBinOp, CallBinOp>(place.getBin().getDefiningOp());
+        isa_and_present<BucketBinOp, CallBinOp>(place.getBin().getDefiningOp());
     return place.getStage() == stage.getSymName() && !isSame
                ? WalkResult::interrupt()
                : WalkResult::advance();
@@ -173,7 +180,7 @@ void PrefetchPass::convert(scf::ForOp loop, ItemOp item) {
     Value by = arith::ConstantIndexOp::create(builder, loc, distance);
     return arith::AddIOp::create(builder, loc, loop.getInductionVar(), by);
   };
-  // It may be in the next bin, or behind the last one.
+  // It may be in the next bin, or after the last one.
   PrefetchItemOp::create(builder, loc, item.getBins(), ahead(farDistance));
   if (references.empty())
     return;

@@ -2,9 +2,15 @@
 //
 // Staged software prefetching for rows of pixels. Where a pixel reads a key, by
 // it a triangle, and by that its corners, the corners of the next row are asked
-// for, and the triangles of the one behind it, whose numbers the stage for the
+// for, and the triangles of the one after it, whose numbers the stage for the
 // corners reads. Each stage is a loop of its own, with a copy of what leads to
 // the places it asks for, so that lanes share it as they do the pixels.
+//
+// Nothing is asked for pixels that refer to the same as those of the row
+// before. There is no stage for buffers that the nearest caches hold (4 MiB),
+// nor for what pixels read at their own place if it is less than 1 MiB: in
+// larger images each row of a bin is on a page of its own, where no hardware
+// prefetcher follows. What pixels refer to elsewhere in images is not followed.
 
 #include "CPU/PrefetchRows.h"
 
@@ -173,7 +179,7 @@ void RowPrefetcher::findReferences() {
 //===----------------------------------------------------------------------===//
 
 /// The same value for another pixel. What is read on the way to a place is
-/// inside of its buffer: errors are for the pixel's own turn.
+/// inside of its buffer: errors are for the pixel's own iteration.
 Value RowPrefetcher::clone(Value value, OpBuilder &builder,
                            IRMapping &mapping) {
   if (Value known = mapping.lookupOrNull(value))
@@ -320,7 +326,7 @@ void RowPrefetcher::run() {
       at.forEach(lower, at.min(upper, at.add(lower, distance)), rows.getStep(),
                  [&](Value row) { writeStage(stage, row, true, builder); });
     });
-    // The last ones are known by what is left: there may be no number behind.
+    // The last ones are known by what is left: there may be no number after.
     builder.setInsertionPoint(pixels);
     Value row = rows.getInductionVar();
     Value isInside =

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-tabulate-invariants: loop-invariant code motion of what differs only
-// from turn to turn of an inner loop, by scalar expansion to an array.
+// from iteration to iteration of an inner loop, by scalar expansion to an
+// array.
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
@@ -42,11 +43,11 @@ private:
     return !outermost->isAncestor(at);
   }
   bool findOutermost();
-  /// Whether a value is known in front of all loops, where it may be made
+  /// Whether a value is known before all loops, where it may be made
   /// again.
   bool isKnown(Value value);
   bool isFixed(LoadOp load);
-  bool isOfTurn(LoadOp load);
+  bool isOfIteration(LoadOp load);
   void findNumbers();
   bool isWorthwhile(Value number);
   Value clone(Value value, OpBuilder &builder, IRMapping &mapping);
@@ -55,13 +56,13 @@ private:
   scf::ForOp loop;
   Operation *outermost = nullptr; ///< the loop around all others
   const llvm::DenseSet<StringAttr> &written;
-  llvm::SetVector<Value> numbers; ///< of a turn alone
+  llvm::SetVector<Value> numbers; ///< of an iteration alone
 };
 
 } // namespace
 
-/// With fewer or more turns the loop runs as it was.
-static constexpr int64_t leastTurns = 32, mostTurns = 1024;
+/// With fewer or more iterations the loop runs as it was.
+static constexpr int64_t leastIterations = 32, mostIterations = 1024;
 
 bool Tabulator::findOutermost() {
   for (Operation *at = loop->getParentOp(); at && !isa<scf::ForallOp>(at);
@@ -76,8 +77,8 @@ bool Tabulator::isFixed(LoadOp load) {
          load.getElements().empty();
 }
 
-/// Whether a turn reads the element of its own number.
-bool Tabulator::isOfTurn(LoadOp load) {
+/// Whether an iteration reads the element of its own number.
+bool Tabulator::isOfIteration(LoadOp load) {
   if (!load.getChecked() || load.getIndices().size() != 1)
     return false;
   Value index = load.getIndices().front();
@@ -100,8 +101,9 @@ bool Tabulator::isKnown(Value value) {
          });
 }
 
-/// Numbers that are computed of the turn's own number alone. What only a side
-/// of a condition reads is not: its place may be known to exist there only.
+/// Numbers that are computed of the iteration's own number alone. What only a
+/// side of a condition reads is not: its place may be known to exist there
+/// only.
 void Tabulator::findNumbers() {
   auto isPart = [&](Value value) {
     return value == loop.getInductionVar() || numbers.contains(value) ||
@@ -113,7 +115,7 @@ void Tabulator::findNumbers() {
     auto load = dyn_cast<LoadOp>(op);
     bool isScalar = op->getNumResults() == 1 && op->getNumRegions() == 0 &&
                     op->getResult(0).getType().isIntOrIndexOrFloat();
-    bool isFree = load ? isFixed(load) && isOfTurn(load)
+    bool isFree = load ? isFixed(load) && isOfIteration(load)
                        : isPure(op) && !isa<arith::ConstantOp>(op);
     if (isScalar && isFree && llvm::all_of(op->getOperands(), isPart))
       numbers.insert(op->getResult(0));
@@ -158,11 +160,11 @@ void Tabulator::writeTable(Value number, OpBuilder &builder, Value fits,
   Location loc = number.getLoc();
   CodeBuilder at(builder, loc);
   Value table = memref::AllocaOp::create(
-      builder, loc, MemRefType::get({mostTurns}, number.getType()));
-  at.forEach(at.index(0), count, at.index(1), [&](Value turn) {
+      builder, loc, MemRefType::get({mostIterations}, number.getType()));
+  at.forEach(at.index(0), count, at.index(1), [&](Value iteration) {
     IRMapping mapping;
-    mapping.map(loop.getInductionVar(), turn);
-    at.store(clone(number, builder, mapping), table, turn);
+    mapping.map(loop.getInductionVar(), iteration);
+    at.store(clone(number, builder, mapping), table, iteration);
   });
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointAfterValue(number);
@@ -186,12 +188,12 @@ void Tabulator::writeTable(Value number, OpBuilder &builder, Value fits,
 }
 
 void Tabulator::run() {
-  std::optional<APInt> turns = loop.getStaticTripCount();
+  std::optional<APInt> iterations = loop.getStaticTripCount();
   constexpr int64_t few = 16; // LLVM unrolls it
   if (!findOutermost() || !matchPattern(loop.getLowerBound(), m_Zero()) ||
       !matchPattern(loop.getStep(), m_One()) ||
       !loop.getInductionVar().getType().isIndex() ||
-      (turns && turns->sle(few)) || !isKnown(loop.getUpperBound()))
+      (iterations && iterations->sle(few)) || !isKnown(loop.getUpperBound()))
     return;
   findNumbers();
   SmallVector<Value> found = llvm::filter_to_vector(
@@ -208,8 +210,8 @@ void Tabulator::run() {
     if (auto load = number.getDefiningOp<LoadOp>())
       states.insert(load.getStateAttr());
   Value fits =
-      at.both(at.compare(CodeBuilder::P::sge, upper, at.index(leastTurns)),
-              at.compare(CodeBuilder::P::sle, upper, at.index(mostTurns)));
+      at.both(at.compare(CodeBuilder::P::sge, upper, at.index(leastIterations)),
+              at.compare(CodeBuilder::P::sle, upper, at.index(mostIterations)));
   for (Attribute state : states) {
     Value extent =
         ExtentOp::create(builder, at.loc, cast<FlatSymbolRefAttr>(state),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-thread-jumps: what only one side of a condition needs stands behind it.
+// piko-thread-jumps: what only one side of a condition needs stands after it.
 
 #include "Piko/Transforms/Passes.h"
 
@@ -53,7 +53,7 @@ static int64_t getWeight(Operation &op) {
   return weight;
 }
 
-/// What of the block in front of a condition serves nothing but the second half
+/// What of the block before a condition serves nothing but the second half
 /// and the sides of the condition.
 static Conjunction collectWork(scf::IfOp choice, Value first, Value second) {
   Conjunction found{first, second, {}, 0};

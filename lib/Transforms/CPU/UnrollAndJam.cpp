@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-unroll-and-jam: of a loop around another one,
-//   1. test that turns of the outer loop that change the same element do so in
-//      the same turn of the inner one, which keeps their order when several of
-//      them share the inner loop;
-//   2. in front of it, repeat it for as many turns as a multiple of the factor,
+//   1. test that iterations of the outer loop that change the same element do
+//      so in the same iteration of the inner one, which keeps their order when
+//      several of them share the inner loop;
+//   2. before it, repeat it for as many iterations as a multiple of the factor,
 //      with that many of them in each run of the inner loop;
-//   3. hand on, in such a turn, what one copy stored to the next that loads it.
+//   3. hand on, in such an iteration, what one copy stored to the next that
+//      loads it.
 
 #include "CPU/IndexRanges.h"
 
@@ -28,12 +29,12 @@ namespace piko {
 using namespace mlir;
 using namespace piko;
 
-/// Turns of the outer loop that share one of the inner loop, and how much may
-/// stand in the inner loop: what they need at once must fit into registers.
+/// Iterations of the outer loop that share one of the inner loop, and how much
+/// may stand in the inner loop: what they need at once must fit into registers.
 static constexpr int64_t factor = 4, mostOperations = 24;
-/// Turns of an inner loop that LLVM unrolls, so that its elements may stay in
-/// registers through the outer loop: channels of a color.
-static constexpr int64_t fewTurns = 5;
+/// Iterations of an inner loop that LLVM unrolls, so that its elements may stay
+/// in registers through the outer loop: channels of a color.
+static constexpr int64_t fewIterations = 5;
 
 namespace {
 
@@ -60,16 +61,16 @@ struct Access {
 class Nest {
 public:
   static std::optional<Nest> find(LoopLikeOpInterface outer);
-  /// What keeps the turns in order; null if nothing does.
+  /// What keeps the iterations in order; null if nothing does.
   Operation *findConflict();
-  /// Whether turns of the outer loop use the same element.
+  /// Whether iterations of the outer loop use the same element.
   bool hasReuse();
   void jam();
 
 private:
   Nest(Counting outer, Counting inner) : outer(outer), inner(inner) {}
   bool collect();
-  /// Whether it is the same in all turns of both loops.
+  /// Whether it is the same in all iterations of both loops.
   bool isFixed(Value value);
   bool countsBelow(Value count, Value other);
   bool isOneToOne(Value index);
@@ -80,14 +81,15 @@ private:
   void setFirst(Value first);
 
   Counting outer, inner;
-  SmallVector<Operation *> front; ///< of the outer loop, in front of the inner
+  SmallVector<Operation *> front; ///< of the outer loop, before the inner
   SmallVector<Access> accesses;
   llvm::DenseSet<const void *> written;
-  llvm::DenseSet<Value> varying; ///< from turn to turn of the outer loop
+  llvm::DenseSet<Value>
+      varying; ///< from iteration to iteration of the outer loop
 };
 
-/// What the copies of an inner loop's turn have stored and not yet loaded from
-/// elsewhere.
+/// What the copies of an inner loop's iteration have stored and not yet loaded
+/// from elsewhere.
 class Forwarding {
 public:
   /// The number that a load would find, if a store has just written it.
@@ -169,7 +171,7 @@ static bool isShort(const LoopCount &count) {
   APInt first, end;
   return matchPattern(count.first, m_ConstantInt(&first)) &&
          matchPattern(count.end, m_ConstantInt(&end)) &&
-         end.sle(first.getSExtValue() + fewTurns);
+         end.sle(first.getSExtValue() + fewIterations);
 }
 
 std::optional<Nest> Nest::find(LoopLikeOpInterface loop) {
@@ -276,9 +278,10 @@ bool Nest::countsBelow(Value count, Value other) {
          first.isNonNegative() && end.sle(int64_t(1) << bits);
 }
 
-/// Whether an index differs from one turn of the inner loop to any other, and
-/// is the same in all turns of the outer one: a sum of the count and of what
-/// neither loop changes, which is one to one even where it wraps around.
+/// Whether an index differs from one iteration of the inner loop to any other,
+/// and is the same in all iterations of the outer one: a sum of the count and
+/// of what neither loop changes, which is one to one even where it wraps
+/// around.
 bool Nest::isOneToOne(Value index) {
   if (index == inner.count.value)
     return true;
@@ -308,7 +311,7 @@ Operation *Nest::findConflict() {
       continue;
     auto [found, isNew] = places.try_emplace(access.memory);
     SmallVector<Value> &place = found->second;
-    // Null: a dimension in which turns may meet.
+    // Null: a dimension in which iterations may meet.
     if (isNew)
       for (Value index : access.indices)
         place.push_back(isOneToOne(index) ? index : Value());
@@ -371,16 +374,16 @@ void Forwarding::store(const Access &store, Operation *clone,
 // Rewriting
 //===----------------------------------------------------------------------===//
 
-/// Where the turns end that are a multiple of the factor.
+/// Where the iterations end that are a multiple of the factor.
 Value Nest::createEnd(OpBuilder &builder) {
   Location loc = outer.loop.getLoc();
   Value first = outer.count.first, end = outer.count.end;
   Value any = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
                                     first, end);
-  Value turns = arith::SubIOp::create(builder, loc, end, first);
+  Value iterations = arith::SubIOp::create(builder, loc, end, first);
   Value by = arith::ConstantOp::create(
       builder, loc, builder.getIntegerAttr(first.getType(), factor));
-  Value rest = arith::RemUIOp::create(builder, loc, turns, by);
+  Value rest = arith::RemUIOp::create(builder, loc, iterations, by);
   Value last = arith::SubIOp::create(builder, loc, end, rest);
   return arith::SelectOp::create(builder, loc, any, last, first);
 }
@@ -443,14 +446,14 @@ void Nest::jam() {
     for (Operation *op : front)
       builder.clone(*op, mapping);
   }
-  // What is computed in front of it in each turn alike is any turn's.
-  auto turns = scf::ForOp::create(
+  // What is computed before it in each iteration alike is any iteration's.
+  auto iterations = scf::ForOp::create(
       builder, innerLoc, mappings[0].lookupOrDefault(inner.count.first),
       mappings[0].lookupOrDefault(inner.count.end),
       constant(inner.count.first.getType(), 1));
   for (IRMapping &mapping : mappings)
-    mapping.map(inner.count.value, turns.getInductionVar());
-  builder.setInsertionPointToStart(turns.getBody());
+    mapping.map(inner.count.value, iterations.getInductionVar());
+  builder.setInsertionPointToStart(iterations.getBody());
   cloneInner(builder, mappings);
   setFirst(end);
 }
@@ -464,16 +467,17 @@ void UnrollAndJamPass::runOnOperation() {
       if (!nest || !nest->hasReuse())
         continue;
       if (Operation *conflict = nest->findConflict()) {
-        InFlightDiagnostic remark =
-            loop->emitRemark("turns of this loop do not share those of the "
-                             "loop inside of it (unroll-and-jam)");
+        InFlightDiagnostic remark = loop->emitRemark(
+            "iterations of this loop do not share those of the "
+            "loop inside of it (unroll-and-jam)");
         remark.attachNote(conflict->getLoc())
-            << "it may use an element here that another turn of the inner loop "
+            << "it may use an element here that another iteration of the inner "
+               "loop "
                "changes";
         continue;
       }
       loop->emitRemark() << factor
-                         << " turns of this loop share those of the loop "
+                         << " iterations of this loop share those of the loop "
                             "inside of it (unroll-and-jam)";
       nest->jam();
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // What several places of a program compute alike, as a graph, and where it is
-// cheapest to cut: what is before the cut stays in each place, what is behind
+// cheapest to cut: what is before the cut stays in each place, what is after
 // it moves elsewhere, once.
 
 #ifndef PIKO_LIB_TRANSFORMS_COMMONSLICE_H

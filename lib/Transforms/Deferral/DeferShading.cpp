@@ -4,9 +4,15 @@
 //   1. find the updates that overwrite pixels of images which the kernel does
 //      not read: of all that a bin's primitives write there, the last is seen;
 //   2. find what all of them compute alike, and where to cut it, so that little
-//      has to be kept for each pixel;
+//      has to be kept for each pixel: a minimum cut, with all loops after it;
 //   3. keep that in place of the updates, and do the rest in a loop over the
-//      bin's pixels behind the work.
+//      bin's pixels after the work.
+// The test that decides whether a primitive is seen stays where it is, and may
+// be any. An update that tests a pixel and overwrites it, on one condition, is
+// split for that: one changes what the test reads, and one overwrites the rest.
+//
+// This is deferred shading: T. Saito and T. Takahashi, "Comprehensible
+// Rendering of 3-D Shapes", 1990.
 
 #include "Deferral/Deferral.h"
 
@@ -34,7 +40,7 @@ struct DeferShadingPass : piko::impl::DeferShadingBase<DeferShadingPass> {
   void runOnBins(KernelOp kernel, BinsOp bins);
 };
 
-/// Keeps what is deferred in arrays of a bin, behind whose work it is done.
+/// Keeps what is deferred in arrays of a bin, after whose work it is done.
 class BinDeferral {
 public:
   BinDeferral(BinsOp bins, const Deferral &what)
@@ -54,7 +60,7 @@ private:
   const Deferral &what;
   StageOp stage;
   SmallVector<Value> first;  ///< The bin's first cell.
-  Value isPainted;           ///< By pixel, whether anything is kept.
+  Value isOverwritten;       ///< By pixel, whether anything is kept.
   SmallVector<Value> arrays; ///< By pixel, what is kept.
 };
 
@@ -105,7 +111,7 @@ void BinDeferral::createArrays() {
     array->setAttr(marks::pixels, what.getFirst().getImageAttr().getAttr());
     return array;
   };
-  isPainted = createArray(builder.getI32Type());
+  isOverwritten = createArray(builder.getI32Type());
   for (Type type : what.getStoredTypes())
     arrays.push_back(createArray(type));
   auto constant = [&](int64_t value) {
@@ -115,21 +121,22 @@ void BinDeferral::createArrays() {
                                  constant(getPixels()), constant(1));
   builder.setInsertionPointToStart(loop.getBody());
   Value no = arith::ConstantIntOp::create(builder, loc, 0, 32);
-  memref::StoreOp::create(builder, loc, no, isPainted, loop.getInductionVar());
+  memref::StoreOp::create(builder, loc, no, isOverwritten,
+                          loop.getInductionVar());
 }
 
-/// The value behind which all values are known.
+/// The value after which all values are known.
 static Value getInnermost(ValueRange values) {
   Value inner = values.front();
   for (Value value : values.drop_front()) {
     Block *block = value.getParentBlock();
-    bool isBehind =
+    bool isAfter =
         block == inner.getParentBlock()
             ? value.getDefiningOp() && (!inner.getDefiningOp() ||
                                         inner.getDefiningOp()->isBeforeInBlock(
                                             value.getDefiningOp()))
             : inner.getParentRegion()->isAncestor(value.getParentRegion());
-    if (isBehind)
+    if (isAfter)
       inner = value;
   }
   return inner;
@@ -141,14 +148,14 @@ void BinDeferral::keepAt(size_t site) {
   ValueRange coordinates = last.getCoordinates();
   OpBuilder builder(last);
   Location loc = last.getLoc();
-  // Sites that paint one pixel of a loop have one place, too.
+  // Sites that overwrite one pixel of a loop have one place, too.
   builder.setInsertionPointAfterValue(getInnermost(coordinates));
   Value place = getPlace(builder, loc, coordinates);
   builder.setInsertionPoint(last);
   for (auto [value, array] : llvm::zip(what.store(builder, site), arrays))
     memref::StoreOp::create(builder, loc, value, array, place);
   Value yes = arith::ConstantIntOp::create(builder, loc, 1, 32);
-  memref::StoreOp::create(builder, loc, yes, isPainted, place);
+  memref::StoreOp::create(builder, loc, yes, isOverwritten, place);
 }
 
 /// The loop over the pixels of the bin that does the rest.
@@ -161,7 +168,7 @@ void BinDeferral::createLoop() {
                     Location loc = work->getLoc();
                     if (!place)
                       place = getPlace(builder, loc, pixel);
-                    Value array = number ? arrays[*number] : isPainted;
+                    Value array = number ? arrays[*number] : isOverwritten;
                     return memref::LoadOp::create(builder, loc, array, place);
                   });
 }

@@ -76,8 +76,8 @@ static bool holdsLoop(Operation *op) {
       .wasInterrupted();
 }
 
-/// Whether a loop over pixels stands behind an operation, outside of which that
-/// computes once what all of them take: behind the work each would do so for
+/// Whether a loop over pixels stands after an operation, outside of which that
+/// computes once what all of them take: after the work each would do so for
 /// itself.
 bool Deferral::isShared(Operation *op) const {
   for (const Site &site : sites)
@@ -119,7 +119,7 @@ bool Deferral::isMovable(Operation *op) const {
             }).wasInterrupted();
 }
 
-/// Whether all pixels of a primitive read the same: behind the work each pixel
+/// Whether all pixels of a primitive read the same: after the work each pixel
 /// would read it for itself.
 bool Deferral::isOfItem(LoadOp load) const {
   Operation *loop = nullptr;
@@ -147,8 +147,8 @@ static int64_t getCost(Operation *op) {
   for (Region &region : op->getRegions())
     for (Operation &inner : region.getOps())
       cost += getCost(&inner);
-  constexpr int64_t turns = 16;
-  return isa<LoopLikeOpInterface>(op) ? turns * cost : cost;
+  constexpr int64_t iterations = 16;
+  return isa<LoopLikeOpInterface>(op) ? iterations * cost : cost;
 }
 
 /// Whether computing for each pixel takes longer than keeping so many numbers.
@@ -158,7 +158,7 @@ static bool isWorthwhile(ArrayRef<Operation *> ops, int64_t numbers,
   for (Operation *op : ops)
     cost += getCost(op);
   // What is stored and read again for a number, in the second level or beyond;
-  // and a pixel's turn of the loop.
+  // and a pixel's iteration of the loop.
   bool isNear = to == Deferral::To::Bin;
   int64_t perNumber = isNear ? 6 : 12, perPixel = isNear ? 64 : 96;
   return cost > perPixel + perNumber * numbers;
@@ -174,7 +174,7 @@ CommonSlice::Rules Deferral::makeRules() {
           }};
 }
 
-/// Moves reads of a primitive's fields out of what may move: behind the work
+/// Moves reads of a primitive's fields out of what may move: after the work
 /// there are no primitives.
 static void hoistFields(const Site &site) {
   for (Operation &op : *site.updates.front()->getBlock()) {
@@ -403,7 +403,7 @@ static std::optional<Reason> whyNotHere(StageOp stage, ArrayRef<Site> sites,
   return std::nullopt;
 }
 
-/// Takes apart what tests pixels and paints them.
+/// Takes apart what tests pixels and overwrites them.
 static void splitUpdates(BinsOp bins, Deferral::To to) {
   SmallVector<UpdateOp> updates;
   bins.walk([&](UpdateOp update) { updates.push_back(update); });
@@ -420,8 +420,8 @@ void piko::forEachDeferral(
   if (isPossible(stage, to))
     splitUpdates(bins, to);
   for (const SmallVector<Site> &sites : findSites(kernel)) {
-    Operation *work = findPaintingWork(bins, sites);
-    if (!work || (sites.size() == 1 && paintsOnce(work, sites.front())))
+    Operation *work = findOverwritingWork(bins, sites);
+    if (!work || (sites.size() == 1 && overwritesOnce(work, sites.front())))
       continue;
     UpdateOp update = sites.front().updates.front();
     Location loc = update.getLoc();

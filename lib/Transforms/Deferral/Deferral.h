@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Shading that is put off: what the primitives of a bin paint pixels with is
-// seen of the last one alone, so that most of it may be computed when all of
+// Shading that is put off: what the primitives of a bin overwrite pixels with
+// is seen of the last one alone, so that most of it may be computed when all of
 // them are done, from a few numbers that are kept of each pixel.
 
 #ifndef PIKO_LIB_TRANSFORMS_DEFERRAL_H
 #define PIKO_LIB_TRANSFORMS_DEFERRAL_H
 
 #include "Deferral/CommonSlice.h"
-#include "Deferral/PaintedPixels.h"
+#include "Deferral/OverwrittenPixels.h"
 #include "Support/BinOwner.h"
 
 namespace piko {
 
-/// What the primitives of a bin paint some images with, and which part of that
-/// is done later.
+/// What the primitives of a bin overwrite some images with, and which part of
+/// that is done later.
 class Deferral {
 public:
-  /// Where it is done: in the bin, behind its primitives, or by a kernel of its
+  /// Where it is done: in the bin, after its primitives, or by a kernel of its
   /// own.
   enum class To { Bin, Kernel };
 
@@ -36,12 +36,12 @@ public:
   llvm::ArrayRef<Site> getSites() const { return sites; }
   mlir::Operation *getWork() const { return work; }
   StageOp getStage() const { return stage; }
-  /// The first of what paints.
+  /// The first of what overwrites.
   UpdateOp getFirst() const { return sites.front().updates.front(); }
   /// The last one at a site.
   UpdateOp getLast(size_t site) const;
 
-  /// The images that are painted, and the state that is read later.
+  /// The images that are overwritten, and the state that is read later.
   llvm::DenseSet<mlir::StringAttr> getImages() const;
   llvm::DenseSet<mlir::StringAttr> getReadState() const;
   LoadOp findFailure() const;

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-form-gbuffer, for the work of each kernel over bins that are the whole
-// domain: what its primitives paint pixels with is computed, as far as it can
-// be put off, by a kernel of its own behind that one, for bins of a size, from
-// what is kept of each pixel in internal images (a G-buffer).
+// domain: what its primitives overwrite pixels with is computed, as far as it
+// can be put off, by a kernel of its own after that one, for bins of a size,
+// from what is kept of each pixel in internal images (a G-buffer).
+//
+// What is left of the first kernel is what piko-reduce-updates or
+// piko-reduce-by-atomics lets threads or blocks share, if it is a reduction.
+// What is cheaper to compute than to keep stays in it. That is more than
+// piko-defer-shading leaves, as what is kept of a screen does not fit the first
+// level of a cache.
 
 #include "Deferral/Deferral.h"
 #include "Deferral/InternalImage.h"
@@ -59,13 +65,13 @@ private:
   PipelineOp pipeline;
   const Deferral &what;
   OpBuilder builder;
-  ImageOp kept;    ///< What is kept of a pixel; null if that is nothing.
-  ImageOp painted; ///< Whether there is anything.
+  ImageOp kept;        ///< What is kept of a pixel; null if that is nothing.
+  ImageOp overwritten; ///< Whether there is anything.
 };
 
 } // namespace
 
-/// Why the rest cannot be done behind all that runs until the last launch.
+/// Why the rest cannot be done after all that runs until the last launch.
 std::optional<Reason> GBuffer::whyNot() {
   llvm::DenseSet<StringAttr> images = what.getImages(),
                              read = what.getReadState();
@@ -97,8 +103,8 @@ void GBuffer::createImages() {
   SmallVector<Type> types = what.getStoredTypes();
   if (!types.empty())
     kept = createInternalImage(image, "kept", types, /*clear=*/nullptr);
-  painted = createInternalImage(
-      image, "painted", {Type(builder.getI32Type())},
+  overwritten = createInternalImage(
+      image, "overwritten", {Type(builder.getI32Type())},
       builder.getArrayAttr({Attribute(builder.getI32IntegerAttr(0))}));
 }
 
@@ -124,12 +130,12 @@ void GBuffer::keepAt(size_t site) {
   if (kept)
     keep(last, kept, what.store(builder, site));
   builder.setInsertionPoint(last);
-  keep(last, painted,
+  keep(last, overwritten,
        {Value(arith::ConstantIntOp::create(builder, last.getLoc(), 1, 32))});
 }
 
 //===----------------------------------------------------------------------===//
-// The kernel behind
+// The kernel after
 //===----------------------------------------------------------------------===//
 
 /// The side of a bin of at most 1024 pixels.
@@ -162,7 +168,7 @@ StageOp GBuffer::createStage() {
   builder.createBlock(&stage.getBody());
   ScheduleOp::create(builder, loc, ScheduleKind::LoadBalance,
                      /*tileSplit=*/nullptr, /*endStage=*/nullptr,
-                     /*endBin=*/false, /*behind=*/false, /*batch=*/nullptr,
+                     /*endBin=*/false, /*after=*/false, /*batch=*/nullptr,
                      /*everyBin=*/true, /*unordered=*/false, /*resolved=*/true,
                      /*lanes=*/nullptr);
   return stage;
@@ -188,7 +194,7 @@ KernelOp GBuffer::createKernel(StageOp stage) {
   what.createLoop(
       builder, stage, bin,
       [&](ValueRange pixel, std::optional<size_t> number) -> Value {
-        ImageOp image = number ? kept : painted;
+        ImageOp image = number ? kept : overwritten;
         auto record = image->getParentOfType<ModuleOp>().lookupSymbol<RecordOp>(
             image.getRecord());
         auto field = cast<FieldAttr>(record.getFields()[number.value_or(0)]);
@@ -203,13 +209,13 @@ KernelOp GBuffer::createKernel(StageOp stage) {
   return kernel;
 }
 
-/// Behind all launches of the other kernel, with no pixel painted in front.
+/// After all launches of the other kernel, with no pixel overwritten before.
 void GBuffer::addToProgram(StageOp stage, KernelOp kernel) {
   Location loc = launch.getLoc();
   builder.setInsertionPoint(around);
   ClearOp::create(builder, loc,
                   builder.getArrayAttr({Attribute(
-                      FlatSymbolRefAttr::get(painted.getSymNameAttr()))}));
+                      FlatSymbolRefAttr::get(overwritten.getSymNameAttr()))}));
   builder.setInsertionPointAfter(around);
   auto join = JoinOp::create(
       builder, loc, BinsType::get(builder.getContext(), stage.getInputAttr()),
@@ -252,8 +258,8 @@ void FormGBufferPass::runOnBins(KernelOp kernel, BinsOp bins) {
     UpdateOp update = what.getFirst();
     update.emitRemark("what is written to '")
         << update.getImage() << "' is computed once for each pixel, by a kernel"
-        << " behind that of stage '" << getCppName(what.getStage())
-        << "', from " << what.getBytes() << " bytes";
+        << " after that of stage '" << getCppName(what.getStage()) << "', from "
+        << what.getBytes() << " bytes";
     buffer.form();
     return std::nullopt;
   };

@@ -9,7 +9,7 @@
 
 namespace piko {
 
-/// An internal image behind another one of its rank, with numbers for each
+/// An internal image after another one of its rank, with numbers for each
 /// pixel: a record `piko.` and `what`, after which the image and its fields are
 /// called, too. `clear` is what it is cleared to, or null.
 ImageOp createInternalImage(ImageOp image, llvm::StringRef what,

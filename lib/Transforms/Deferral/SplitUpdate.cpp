@@ -19,8 +19,8 @@ public:
         yield(cast<YieldOp>(body.getTerminator())),
         written(getWrittenState(update)) {}
 
-  /// Finds the numbers that can be painted later; false if there are none.
-  bool findPainted();
+  /// Finds the numbers that can be overwritten later; false if there are none.
+  bool findOverwritten();
   ArrayRef<Operation *> getWork() const { return work.getArrayRef(); }
   void split();
 
@@ -29,14 +29,14 @@ private:
   bool collect(Value value);
   bool isInUpdate(Operation *op) const { return update->isProperAncestor(op); }
   UpdateOp createTest();
-  void paint(UpdateOp test);
+  void overwrite(UpdateOp test);
 
   UpdateOp update;
   Block &body;
   YieldOp yield;
   llvm::DenseSet<StringAttr> written; ///< State that the update changes.
   std::optional<Choice> common;       ///< Its condition and outcome.
-  SmallVector<std::pair<unsigned, Value>> painted;
+  SmallVector<std::pair<unsigned, Value>> overwritten;
   llvm::SetVector<Operation *> work; ///< Operands before their users.
 };
 
@@ -100,7 +100,7 @@ bool UpdateSplitter::collect(Value value) {
   return true;
 }
 
-bool UpdateSplitter::findPainted() {
+bool UpdateSplitter::findOverwritten() {
   for (unsigned i = 0; i < body.getNumArguments(); ++i) {
     std::optional<Choice> choice = findChoice(i);
     if (!choice || (common && (common->condition != choice->condition ||
@@ -112,9 +112,9 @@ bool UpdateSplitter::findPainted() {
       continue;
     }
     common = choice;
-    painted.emplace_back(i, choice->value);
+    overwritten.emplace_back(i, choice->value);
   }
-  return !painted.empty();
+  return !overwritten.empty();
 }
 
 /// Lets a number stay, so that nothing of its choice reads it.
@@ -131,7 +131,8 @@ static void removeChoice(OpOperand &number, Value old) {
     end->setOperand(choice.getResultNumber(), none);
 }
 
-/// The update without what is painted, and with the condition as a result more.
+/// The update without what is overwritten, and with the condition as a result
+/// more.
 UpdateOp UpdateSplitter::createTest() {
   OpBuilder builder(update);
   SmallVector<Type> types(update.getResultTypes());
@@ -144,15 +145,15 @@ UpdateOp UpdateSplitter::createTest() {
   IRMapping mapping;
   update.getBody().cloneInto(&test.getBody(), mapping);
   auto end = cast<YieldOp>(test.getBody().front().getTerminator());
-  for (auto [number, value] : painted)
+  for (auto [number, value] : overwritten)
     removeChoice(end.getPixelMutable()[number],
                  test.getBody().getArgument(number));
   end.getResultsMutable().append(mapping.lookupOrDefault(common->condition));
   return test;
 }
 
-/// Overwrites the numbers behind the test.
-void UpdateSplitter::paint(UpdateOp test) {
+/// Overwrites the numbers under the test.
+void UpdateSplitter::overwrite(UpdateOp test) {
   OpBuilder builder(update);
   Location loc = update.getLoc();
   Value condition = test.getResults().back();
@@ -166,15 +167,15 @@ void UpdateSplitter::paint(UpdateOp test) {
   for (Operation *op : work)
     if (isInUpdate(op))
       builder.clone(*op, mapping);
-  auto paint = UpdateOp::create(builder, loc, TypeRange(), update.getImage(),
-                                update.getCoordinates(), update.getBin(),
-                                update.getTile(), update.getOfAttr());
-  paint->setDiscardableAttrs(update->getDiscardableAttrDictionary());
-  Block &pixel = paint.getBody().emplaceBlock();
+  auto overwrite = UpdateOp::create(
+      builder, loc, TypeRange(), update.getImage(), update.getCoordinates(),
+      update.getBin(), update.getTile(), update.getOfAttr());
+  overwrite->setDiscardableAttrs(update->getDiscardableAttrDictionary());
+  Block &pixel = overwrite.getBody().emplaceBlock();
   for (Value old : body.getArguments())
     pixel.addArgument(old.getType(), old.getLoc());
   SmallVector<Value> numbers(pixel.getArguments());
-  for (auto [number, value] : painted)
+  for (auto [number, value] : overwritten)
     numbers[number] = mapping.lookupOrDefault(value);
   builder.setInsertionPointToStart(&pixel);
   YieldOp::create(builder, loc, numbers, ValueRange());
@@ -182,7 +183,7 @@ void UpdateSplitter::paint(UpdateOp test) {
 
 void UpdateSplitter::split() {
   UpdateOp test = createTest();
-  paint(test);
+  overwrite(test);
   update->replaceAllUsesWith(test.getResults().drop_back());
   update.erase();
 }
@@ -191,7 +192,7 @@ bool piko::splitUpdate(
     UpdateOp update,
     llvm::function_ref<bool(ArrayRef<Operation *>)> isWorthwhile) {
   UpdateSplitter splitter(update);
-  if (!splitter.findPainted() || !isWorthwhile(splitter.getWork()))
+  if (!splitter.findOverwritten() || !isWorthwhile(splitter.getWork()))
     return false;
   splitter.split();
   return true;

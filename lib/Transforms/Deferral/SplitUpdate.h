@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// An update that tests a pixel and paints it, as one that tests it and one that
-// paints it.
+// An update that tests a pixel and overwrites it, as one that tests it and one
+// that overwrites it.
 
 #ifndef PIKO_LIB_TRANSFORMS_SPLITUPDATE_H
 #define PIKO_LIB_TRANSFORMS_SPLITUPDATE_H
@@ -23,7 +23,7 @@ std::optional<Choice> getChoice(mlir::Value value, mlir::Value old);
 /// Takes an update that gives some numbers of a pixel other values on one
 /// condition, values that have nothing to do with what the pixel was, and
 /// makes of it one update that leaves these numbers, and, where the condition
-/// holds, one behind it that overwrites them. Does nothing to others, or where
+/// holds, one after it that overwrites them. Does nothing to others, or where
 /// `isWorthwhile` is false for the operations that the values are computed by.
 /// Whether it has done something.
 bool splitUpdate(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-add-checks, for each pipeline:
-//   1. give primitives records with a lineage behind the user's fields;
+//   1. give primitives records with a lineage after the user's fields;
 //   2. test indices of arrays, and how often loops go round;
 //   3. in process phases, test what is emitted and stored;
 //   4. tell the runtime of calls, emissions, accesses, iterations and barriers.
@@ -136,6 +136,8 @@ static Value getLineage(OpBuilder &builder, Location loc, Value prim) {
 
 void Checker::checkAssign(StageOp stage, AssignOp assign) {
   checkIndices(assign);
+  checkUnwritten(assign,
+                 [&](FlatSymbolRefAttr record) { return hostOf(record); });
   checkTrips(assign);
   assign.walk([&](Operation *op) {
     auto load = dyn_cast<LoadOp>(op);

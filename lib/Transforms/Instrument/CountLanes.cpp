@@ -110,7 +110,7 @@ static Value getBodyMask(scf::WhileOp loop, Value otherwise) {
   return otherwise;
 }
 
-/// The mask in front of the condition: the one that goes around the loop.
+/// The mask before the condition: the one that goes around the loop.
 static Value getHeadMask(scf::WhileOp loop, Value otherwise) {
   Value found;
   for (BlockArgument argument : loop.getBeforeBody()->getArguments())
@@ -202,11 +202,11 @@ void LaneCounter::countBlock(Block &block, Value sums, Value mask) {
   BlockWork work = measure(block);
   Value own = getAccessMask(block);
   for (Operation &op : llvm::make_early_inc_range(block)) {
-    // Of what stands behind the access, its mask is the guard as well.
-    bool isBehind = own && (!own.getDefiningOp() ||
-                            own.getDefiningOp()->isBeforeInBlock(&op));
+    // Of what stands after the access, its mask is the guard as well.
+    bool isAfter = own && (!own.getDefiningOp() ||
+                           own.getDefiningOp()->isBeforeInBlock(&op));
     if (op.getNumRegions())
-      countRegions(op, sums, !mask && isBehind ? own : mask);
+      countRegions(op, sums, !mask && isAfter ? own : mask);
   }
   addWork(block, work, sums, mask ? mask : own);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-count-work counts, in the process phase of each stage,
-//   1. calls, and of each loop its turns, where they begin;
-//   2. emissions and accesses to state, in front of each, and those that are
+//   1. calls, and of each loop its iterations, where they begin;
+//   2. emissions and accesses to state, before each, and those that are
 //      effects for the innermost loop, too;
 //   3. arithmetic, once for each block, at its begin.
 
@@ -39,7 +39,7 @@ private:
   void count(OpBuilder &builder, Location loc, int32_t counter, int64_t amount);
   void countBlock(Block &block);
   void countArithmetic(Block &block);
-  /// Counts its turns and what is in it, if the operation is a loop.
+  /// Counts its iterations and what is in it, if the operation is a loop.
   bool countLoop(Operation *op);
   void countInside(Operation *op);
   void countAccess(Operation *op);
@@ -75,7 +75,7 @@ void WorkCounter::countArithmetic(Block &block) {
     count(builder, loc, integers, integerCount);
 }
 
-/// Of a loop whose body stands in front of its condition: the branch of the
+/// Of a loop whose body stands before its condition: the branch of the
 /// body where another one does nothing but end the loop, as where the text's
 /// own condition does not hold; else all of it.
 static Block *getBodyBranch(scf::WhileOp loop) {
@@ -93,8 +93,9 @@ static Block *getBodyBranch(scf::WhileOp loop) {
   return loop.getBeforeBody();
 }
 
-/// The block of a loop that runs once for each turn; null for what is none.
-static Block *getTurn(Operation *op) {
+/// The block of a loop that runs once for each iteration; null for what is
+/// none.
+static Block *getIteration(Operation *op) {
   if (auto loop = dyn_cast<ParallelLoopOpInterface>(op))
     return loop.getBodyBlock();
   if (auto loop = dyn_cast<scf::ForOp>(op))
@@ -113,17 +114,17 @@ void WorkCounter::countInside(Operation *op) {
 }
 
 bool WorkCounter::countLoop(Operation *op) {
-  Block *turn = getTurn(op);
-  if (!turn)
+  Block *iteration = getIteration(op);
+  if (!iteration)
     return false;
   auto kind = isa<ParallelLoopOpInterface>(op) ? CounterKind::Iterations
-                                               : CounterKind::Turns;
+                                               : CounterKind::Trips;
   int32_t outer = around;
   bool wasInLoop = std::exchange(isInLoop, true);
   around = counters.add(op->getLoc(), kind, stage, outer);
   countInside(op);
   isInLoop = wasInLoop;
-  auto builder = OpBuilder::atBlockBegin(turn);
+  auto builder = OpBuilder::atBlockBegin(iteration);
   count(builder, op->getLoc(), around, 1);
   around = outer;
   return true;

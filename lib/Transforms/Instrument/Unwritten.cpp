@@ -28,7 +28,7 @@ struct Way {
 
 class FlagMaker {
 public:
-  void findTainted(ProcessOp process);
+  void findTainted(Operation *phase);
   bool isTainted(Value value) const { return tainted.contains(value); }
   /// Whether a tainted value is unwritten, as an i1 that is there where it is.
   Value flag(Value value);
@@ -138,8 +138,8 @@ void FlagMaker::taintUsers(Value value) {
   }
 }
 
-void FlagMaker::findTainted(ProcessOp process) {
-  process.walk([&](UndefinedOp op) { taint(op.getResult()); });
+void FlagMaker::findTainted(Operation *phase) {
+  phase->walk([&](UndefinedOp op) { taint(op.getResult()); });
   while (!work.empty())
     taintUsers(work.pop_back_val());
 }
@@ -222,10 +222,10 @@ static SmallVector<StringRef> getNumberNames(RecordOp record) {
 }
 
 void piko::checkUnwritten(
-    ProcessOp process,
+    Operation *phase,
     llvm::function_ref<FlatSymbolRefAttr(FlatSymbolRefAttr)> hostOf) {
   FlagMaker flags;
-  flags.findTainted(process);
+  flags.findTainted(phase);
   auto check = [&](Operation *at, Value value, FlatSymbolRefAttr record,
                    StringRef field) {
     if (!flags.isTainted(value))
@@ -245,7 +245,7 @@ void piko::checkUnwritten(
     return getStateRecord(lookupInPipeline<Operation *>(op, state));
   };
   SmallVector<Operation *> sinks;
-  process.walk([&](Operation *op) {
+  phase->walk([&](Operation *op) {
     if (isa<EmissionOpInterface, StoreOp, UpdateOp>(op))
       sinks.push_back(op);
   });
@@ -262,7 +262,7 @@ void piko::checkUnwritten(
       checkAll(yield, yield.getPixel(), recordOf(op, update.getImageAttr()));
     }
   }
-  process.walk([](UndefinedOp op) {
+  phase->walk([](UndefinedOp op) {
     OpBuilder builder(op);
     Type type = op.getResult().getType();
     Value zero = arith::ConstantOp::create(builder, op.getLoc(),

@@ -15,7 +15,7 @@ namespace piko {
 /// `piko.undefined` of the phase 0. `hostOf` gives the record that a message
 /// names.
 void checkUnwritten(
-    ProcessOp process,
+    mlir::Operation *phase,
     llvm::function_ref<mlir::FlatSymbolRefAttr(mlir::FlatSymbolRefAttr)>
         hostOf);
 

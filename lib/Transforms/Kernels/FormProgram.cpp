@@ -7,7 +7,7 @@
 //            around, so that a wave takes what the one before it emitted.
 //   rounds   a cycle with stages that collect: waves, and stages that are on no
 //            such cycle, producers first; then the stages that collect. An edge
-//            goes around where its consumer stands in front of its producer.
+//            goes around where its consumer stands before its producer.
 
 #include "Piko/Analysis/ProgramPlan.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
@@ -285,7 +285,7 @@ void ProgramWriter::createWaves(int loop) {
     waves.setKeys(keys);
 }
 
-/// The parts of a cycle, which form none; each behind those that emit into it.
+/// The parts of a cycle, which form none; each after those that emit into it.
 SmallVector<Part> ProgramWriter::sortParts(ArrayRef<int> stages) {
   SmallVector<Part> parts, sorted;
   for (int stage : stages) {
@@ -426,7 +426,7 @@ void ProgramWriter::createInputs(ArrayRef<int> stages) {
       createKernel(kernel);
 }
 
-/// Kernels run as they stand, but behind what feeds them: a pass may have
+/// Kernels run as they stand, but after what feeds them: a pass may have
 /// opened a cycle, in which they could stand in any order.
 void ProgramWriter::createKernel(KernelOp kernel) {
   if (!created.insert(kernel).second)

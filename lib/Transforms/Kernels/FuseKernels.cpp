@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-fuse-kernels, for each kernel and each one behind it, in order:
+// piko-fuse-kernels, for each kernel and each one after it, in order:
 //   1. find out whether the former's stages, which become more, feed the
-//   latter's
-//      and it waits for a bin;
+//      latter's and it waits for a bin;
 //   2. check that their bins are the same, on the same core, and that nothing
 //      sees that the latter runs earlier;
-//   3. append it, behind a local barrier.
+//   3. append it, after a local barrier.
+// As many successive stages as possible so run for one bin before the next. The
+// kernel break stays
+//   - for a stage that waits with end_stage for what runs later than its
+//     producer, or that runs for empty bins after a list that does not;
+//   - between stages of which one writes state that another one uses. No kernel
+//     is moved past another such one, unless both only change it atomically.
+//     Two stages of one kernel may update the same image.
 
 #include "Piko/Analysis/BinIdentity.h"
 #include "Piko/Analysis/PhaseGraph.h"
@@ -76,7 +82,7 @@ static KernelOp findKernel(StageOp stage) {
 static bool waitsForBin(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
   return stage.getTakesList() ||
-         (schedule && (schedule.getEndBin() || schedule.getBehind()));
+         (schedule && (schedule.getEndBin() || schedule.getAfter()));
 }
 
 static ScheduleKind getKind(StageOp stage) {
@@ -263,13 +269,13 @@ void FuseKernelsPass::fuseInto(KernelOp host) {
     if (failed(candidate.check(refusal))) {
       InFlightDiagnostic remark = consumer.emitRemark()
                                   << "stage '" << getCppName(consumer)
-                                  << "' does not run bin by bin behind stage '"
+                                  << "' does not run bin by bin after stage '"
                                   << getCppName(producer) << "'";
       remark.attachNote(refusal.at->getLoc()) << refusal.why;
       continue;
     }
     consumer.emitRemark() << "stage '" << getCppName(consumer)
-                          << "' runs bin by bin behind stage '"
+                          << "' runs bin by bin after stage '"
                           << getCppName(producer) << "'";
     inside.insert(kernel.getProcess().getStageAttr());
     candidate.fuse();
@@ -283,7 +289,7 @@ void FuseKernelsPass::runOnOperation() {
   edgesInto.clear();
   for (auto edge : getOperation().getOps<EdgeOp>())
     edgesInto[edge.getConsumerAttr()].push_back(edge);
-  // Those behind a kernel may become part of it.
+  // Those after a kernel may become part of it.
   Block &body = *getOperation().getBodyBlock();
   for (auto op = body.begin(); op != body.end(); ++op)
     if (auto kernel = dyn_cast<KernelOp>(*op); kernel && kernel.getProcess())

@@ -192,7 +192,7 @@ std::optional<Reason> TileFormer::whyNotClear(ImageOp image) {
                                    "one place"};
   if (launch->getParentOfType<WavesOp>() || launch->getParentOfType<RoundsOp>())
     return Reason{stage.getLoc(), "the stage is on a cycle, and may not run at "
-                                  "all; let one behind the cycle do that"};
+                                  "all; let one after the cycle do that"};
   auto name = FlatSymbolRefAttr::get(image.getSymNameAttr());
   std::optional<Reason> reason;
   bool isCleared = false;

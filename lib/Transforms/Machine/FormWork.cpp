@@ -3,9 +3,9 @@
 // piko-form-work, for each kernel:
 //   1. make a piko.bins of the stage, with the process phase in it as work on
 //   the
-//      primitives of a bin or on its list; the same for each phase behind a
+//      primitives of a bin or on its list; the same for each phase after a
 //      local barrier; or work on a source;
-//   2. put a copy of the consumer's assign phase behind each emission;
+//   2. put a copy of the consumer's assign phase after each emission;
 //   3. turn assignments into placements, and queries into arithmetic.
 
 #include "Machine/FormWork.h"

@@ -22,15 +22,15 @@ using namespace piko;
 namespace {
 
 /// A field of an element.
-struct Place {
-  explicit Place(LoadOp load) : Place(load, 0) {}
-  explicit Place(StoreOp store) : Place(store, 0) {}
+struct StatePlace {
+  explicit StatePlace(LoadOp load) : StatePlace(load, 0) {}
+  explicit StatePlace(StoreOp store) : StatePlace(store, 0) {}
 
-  bool isSame(const Place &other) const {
+  bool isSame(const StatePlace &other) const {
     return state == other.state && field == other.field && tile == other.tile &&
            indices == other.indices && elements == other.elements;
   }
-  bool mayOverlap(const Place &other) const;
+  bool mayOverlap(const StatePlace &other) const;
 
   FlatSymbolRefAttr state;
   StringAttr field;
@@ -39,7 +39,7 @@ struct Place {
 
 private:
   template <typename OpT>
-  Place(OpT access, int)
+  StatePlace(OpT access, int)
       : state(access.getStateAttr()), field(access.getFieldAttr()),
         tile(access.getTile()), indices(access.getIndices()),
         elements(access.getElements()) {}
@@ -47,7 +47,7 @@ private:
 
 /// What state is known to hold.
 struct Known {
-  Place place;
+  StatePlace place;
   Value value;
 };
 
@@ -78,7 +78,7 @@ struct ForwardStoresPass : piko::impl::ForwardStoresBase<ForwardStoresPass> {
 } // namespace
 
 /// Fields of a record lie side by side.
-bool Place::mayOverlap(const Place &other) const {
+bool StatePlace::mayOverlap(const StatePlace &other) const {
   if (state != other.state || field != other.field)
     return false;
   auto differ = [](Value a, Value b) {
@@ -95,7 +95,7 @@ bool Place::mayOverlap(const Place &other) const {
 void Forwarder::forgetChanged(Operation *op) {
   op->walk([&](Operation *inner) {
     if (auto store = dyn_cast<StoreOp>(inner)) {
-      Place place(store);
+      StatePlace place(store);
       llvm::erase_if(
           known, [&](const Known &one) { return one.place.mayOverlap(place); });
     } else if (auto access = dyn_cast<StateAccessOpInterface>(inner)) {
@@ -106,7 +106,7 @@ void Forwarder::forgetChanged(Operation *op) {
 }
 
 void Forwarder::visit(LoadOp load) {
-  Place place(load);
+  StatePlace place(load);
   for (const Known &one : known)
     if (one.place.isSame(place) && one.value.getType() == load.getType()) {
       load.getResult().replaceAllUsesWith(one.value);
@@ -117,7 +117,7 @@ void Forwarder::visit(LoadOp load) {
 }
 
 void Forwarder::visit(StoreOp store) {
-  Place place(store);
+  StatePlace place(store);
   llvm::erase_if(known,
                  [&](const Known &one) { return one.place.mayOverlap(place); });
   known.push_back({place, store.getValue()});

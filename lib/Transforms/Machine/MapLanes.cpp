@@ -31,7 +31,7 @@ constexpr int64_t lanes = 32;
 /// To find the primitive of a pair: the five steps of a scan over 32 counts,
 /// and the five of a search in them.
 constexpr int64_t pairCost = 10;
-/// To put an update behind those of the same pixel in lanes in front: a
+/// To put an update after those of the same pixel in lanes in front: a
 /// comparison with each of them, 16 on average.
 constexpr int64_t orderCost = lanes / 2;
 /// Where nothing is known: as many iterations as a bin of 8 x 8 has pixels, or
@@ -116,7 +116,7 @@ static bool mayShareLanes(Operation *op) {
          });
 }
 
-/// As how many operations one in a loop counts whose turns are not known.
+/// As how many operations one in a loop counts whose iterations are not known.
 static constexpr int64_t weightInLoop = 8;
 
 /// How often an operation is taken to run each time that `root` does.
@@ -263,11 +263,11 @@ int64_t LaneWork::getCost(LaneMapping mapping) const {
   }
   int64_t cost = operations + updates * orderCost;
   for (const LaneLoop &loop : loops) {
-    int64_t turn = loop.operations + loop.updates * orderCost;
+    int64_t iteration = loop.operations + loop.updates * orderCost;
     if (mapping == LaneMapping::Items)
-      cost += loop.times * loop.most * turn;
+      cost += loop.times * loop.most * iteration;
     else
-      cost += loop.times * loop.expected * (turn + pairCost + loop.values);
+      cost += loop.times * loop.expected * (iteration + pairCost + loop.values);
   }
   return cost;
 }

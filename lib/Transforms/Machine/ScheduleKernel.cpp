@@ -79,7 +79,7 @@ static KernelOp createKernel(StageOp stage) {
     builder.setInsertionPoint(first);
     break;
   }
-  // Behind the kernels of schedules of earlier stages.
+  // After the kernels of schedules of earlier stages.
   for (auto kernel : pipeline.getOps<KernelOp>())
     if (!kernel.getOps<BeginScheduleOp>().empty())
       builder.setInsertionPointAfter(kernel);

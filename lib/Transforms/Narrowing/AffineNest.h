@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Affine functions of the pixel, in a loop over the pixels of a row and the
-// loop over rows around it; and tests in front of the loops of what values such
+// loop over rows around it; and tests before the loops of what values such
 // functions have in them.
 
 #ifndef PIKO_LIB_TRANSFORMS_AFFINENEST_H
@@ -21,7 +21,7 @@ struct Affine {
 };
 
 /// A loop over the pixels of a row and, if there is one, the loop over rows.
-/// What it makes stands in front of both.
+/// What it makes stands before both.
 class AffineNest {
 public:
   explicit AffineNest(mlir::scf::ForOp row);

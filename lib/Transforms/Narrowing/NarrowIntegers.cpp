@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-narrow-integers: signs and values of affine functions of a pixel in 32
-// bits, where a test in front of the loop finds that they fit.
+// bits, where a test before the loop finds that they fit.
 
 #include "Narrowing/Narrower.h"
 #include "Vectorize/Analysis/Lanes.h"
@@ -77,7 +77,7 @@ void NarrowIntegersPass::runOnOperation() {
       rows.push_back(loop);
   });
   for (scf::ForOp row : rows) {
-    // So that what is the same for all pixels stands in front.
+    // So that what is the same for all pixels stands before.
     hoistLoads(row);
     moveLoopInvariantCode(cast<LoopLikeOpInterface>(row.getOperation()));
     if (auto parent = dyn_cast<LoopLikeOpInterface>(row->getParentOp())) {

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Versions of a loop over pixels, in which functions of the pixel have 32 bits.
+// Versions of a loop over pixels, in which functions of the pixel have 32 bits:
+// twice as many lanes, and no multiplication of 64 bits.
+//
+// What a row begins with is carried from the row before: how many vectors a row
+// has is seldom predicted, and a product is then waited for. A box that lies
+// outside of a half-plane, by what was evaluated at its corners, has no strips.
 
 #include "Narrowing/Narrower.h"
 

@@ -2,6 +2,13 @@
 //
 // Which signs and values of a loop over pixels may be narrow, and what has to
 // be tested for that.
+//
+// A sign is that of a function, or of bits, minima and maxima of several.
+// Functions are divided by the power of two that all their steps are multiples
+// of, and rounded down, which changes no sign. One that becomes a float, as a
+// weight does, is needed with all bits: it is the function whose sign is taken,
+// shifted back, plus what the bits below were, if both have the same steps. So
+// a bias for points on an edge does not matter.
 
 #include "Narrowing/Narrower.h"
 
@@ -66,7 +73,7 @@ bool Narrower::isVarying(arith::SIToFPOp op) {
 }
 
 //===----------------------------------------------------------------------===//
-// In front of the loops
+// Before the loops
 //===----------------------------------------------------------------------===//
 
 Value piko::cutTo32(OpBuilder &builder, Location loc, Value number) {
@@ -188,7 +195,7 @@ void Narrower::requireCondition(Value condition) {
     required.push_back({prepare(test->leaf, signsFit), test->isNegative});
 }
 
-/// Of a block that does nothing but what stands behind one condition, what that
+/// Of a block that does nothing but what stands under one condition, what that
 /// takes.
 void Narrower::findRequired(Block &block) {
   scf::IfOp only;

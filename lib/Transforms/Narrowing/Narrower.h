@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // 64-bit affine functions of a pixel in 32 bits: what of a loop over pixels
-// takes their signs and values, tests in front of it of what fits, and the
+// takes their signs and values, tests before it of what fits, and the
 // versions of it for those that do.
 
 #ifndef PIKO_LIB_TRANSFORMS_NARROWER_H

@@ -1,4 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Around the loop over the rows of a strip stands what finds which of them the
+// half-planes of all edges reach. So hardly any vector is empty, and what a
+// branch decides changes once a strip, not once a row. For half as many strips
+// as there are lanes this is found at once, in vectors, unless lanes may be
+// primitives.
 
 #include "Narrowing/RowStrips.h"
 
@@ -140,7 +146,7 @@ private:
   };
   Edge prepare(const HalfPlane &plane);
   Bounds findBounds(ArrayRef<Edge> edges, Value left);
-  /// Of strips, how many rows lie in front of where an edge is 0.
+  /// Of strips, how many rows lie before where an edge is 0.
   Value findRow(const Edge &edge, Value firstColumn, Value lastColumn);
   Value enterLoop(Value left, Value end, int64_t step);
   void moveRows(Value column, Bounds bounds);
@@ -235,7 +241,7 @@ Value StripWriter::findRow(const Edge &edge, Value firstColumn,
   return convert<arith::FPToSIOp>(row, builder.getI32Type());
 }
 
-// Strips behind the last column have bounds, too, but nobody reads them.
+// Strips after the last column have bounds, too, but nobody reads them.
 StripWriter::Bounds StripWriter::findBounds(ArrayRef<Edge> edges, Value left) {
   Value lefts = spread(left);
   if (group > 1) {
@@ -260,7 +266,7 @@ StripWriter::Bounds StripWriter::findBounds(ArrayRef<Edge> edges, Value left) {
   return bounds;
 }
 
-/// Lets the loop over rows begin with what it had so many rows behind its first
+/// Lets the loop over rows begin with what it had so many rows after its first
 /// one.
 void StripWriter::carryFrom(Value row) {
   for (BlockArgument carried : rows.getRegionIterArgs()) {

@@ -12,7 +12,7 @@ namespace piko {
 
 /// Pixels where base + row step * row + column step * column is not negative,
 /// or where it is, if `isNegative`: in 32 bits, which hold the sum at each
-/// pixel of the loops. Null stands for 0. All are from in front of the loops.
+/// pixel of the loops. Null stands for 0. All are from before the loops.
 struct HalfPlane {
   mlir::Value base, rowStep, columnStep;
   bool isNegative = false;

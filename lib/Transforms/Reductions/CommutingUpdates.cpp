@@ -121,7 +121,7 @@ static void createAtomic(OpBuilder &builder, PixelAccess &pixel,
   pixel.change(builder, change.number, change.kind, value);
 }
 
-/// Behind a test of the pixel.
+/// Under a test of the pixel.
 static void makeAtomic(CommutingUpdate &commuting) {
   UpdateOp update = commuting.update;
   IRRewriter builder(update);

@@ -36,7 +36,7 @@ llvm::SmallVector<CommutingUpdate> findCommutingUpdates(KernelOp kernel);
 llvm::SetVector<mlir::StringAttr>
 getImages(llvm::ArrayRef<CommutingUpdate> updates);
 
-/// Makes updates of a stage atomic operations, behind tests of their pixels,
+/// Makes updates of a stage atomic operations, under tests of their pixels,
 /// and says so.
 void makeAtomic(StageOp stage, llvm::MutableArrayRef<CommutingUpdate> updates);
 

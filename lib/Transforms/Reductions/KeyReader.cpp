@@ -1,4 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A key is compared by <, <=, > or >=, and where it is equal, by what is
+// compared next. Numbers after the first are integers: nothing is before a NaN.
+// Of equal keys the last is kept where the last comparison is <= or >=, else
+// the first.
+
 #include "Reductions/KeyReader.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
@@ -55,7 +61,7 @@ std::optional<KeyReader::Test> KeyReader::readTest(arith::CmpIOp compare,
       llvm::is_contained({P::slt, P::sgt, P::sle, P::sge}, predicate);
   bool isLess = llvm::is_contained({P::slt, P::sle, P::ult, P::ule},
                                    predicate) != isSwapped;
-  test.kind = isStrict ? Test::Before : Test::NotBehind;
+  test.kind = isStrict ? Test::Before : Test::NotAfter;
   test.comparison =
       isSigned ? (isLess ? "slt" : "sgt") : (isLess ? "ult" : "ugt");
   return test;
@@ -102,7 +108,7 @@ std::optional<KeyReader::Test> KeyReader::readTest(arith::CmpFOp compare,
   }
   bool isLess = llvm::is_contained({P::OLT, P::OLE}, predicate) != isSwapped;
   test.kind = llvm::is_contained({P::OLT, P::OGT}, predicate) ? Test::Before
-                                                              : Test::NotBehind;
+                                                              : Test::NotAfter;
   test.comparison = isLess ? "olt" : "ogt";
   return test;
 }
@@ -121,7 +127,7 @@ std::optional<KeyReader::Test> KeyReader::readTest(Value condition,
 bool KeyReader::add(const Test &test) {
   // Where the first number is before, the others are kept as they are.
   if (!values.empty() && isa<FloatType>(test.value.getType()))
-    return refuse("a number behind the first of a key may be a NaN, before "
+    return refuse("a number after the first of a key may be a NaN, before "
                   "which nothing is; let it be an integer");
   if (llvm::is_contained(values, test.value) ||
       llvm::any_of(key.numbers, [&](const KeyNumber &known) {
@@ -210,7 +216,7 @@ bool KeyReader::readConjunction(Literal first, Literal second) {
   for (int order = 0; order < 2; ++order, std::swap(first, second)) {
     std::optional<Test> bound = readTest(first);
     Literal test, yes, no;
-    if (!bound || bound->kind != Test::NotBehind ||
+    if (!bound || bound->kind != Test::NotAfter ||
         !split(second, test, yes, no) || yes)
       continue;
     std::optional<Test> known = readTest(test);
@@ -231,9 +237,9 @@ bool KeyReader::read(Value condition, bool outcome) {
   if (Value negated = getNegated(condition))
     return read(negated, !outcome);
   if (std::optional<Test> test = readTest(condition, outcome)) {
-    if (test->kind != Test::Before && test->kind != Test::NotBehind)
+    if (test->kind != Test::Before && test->kind != Test::NotAfter)
       return refuse(notAKey);
-    key.last = test->kind == Test::NotBehind;
+    key.last = test->kind == Test::NotAfter;
     return add(*test);
   }
   return !why && readChoice({condition, outcome});

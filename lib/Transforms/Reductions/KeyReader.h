@@ -30,7 +30,7 @@ public:
 private:
   /// A comparison of two numbers.
   struct Test {
-    enum Kind : uint8_t { Before, NotBehind, Equal, NotEqual } kind;
+    enum Kind : uint8_t { Before, NotAfter, Equal, NotEqual } kind;
     unsigned number;
     mlir::Value value;
     llvm::StringRef

@@ -1,4 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// An update selects if it gives numbers of the pixel other values on one
+// condition, which compares new numbers with those that they replace
+// (KeyReader). What it overwrites without any condition keeps the last.
+//
+// Other images may be overwritten, at the same pixel, where the update says
+// that it has changed something. What is computed there must not fail, nor
+// leave anything else, as it may be done for what another thread's primitives
+// replace.
+
 #include "Reductions/PixelSelection.h"
 
 #include "Deferral/SplitUpdate.h"
@@ -249,12 +259,12 @@ bool SelectionFinder::findCarried(Selection &selection) {
       return false;
   }
   for (UpdateOp other : carried) {
-    Selection::Site painted{other, Value()};
+    Selection::Site overwritten{other, Value()};
     Selection::Image image;
     SmallVector<Value> values;
-    if (const char *why = readSite(painted, image, values))
+    if (const char *why = readSite(overwritten, image, values))
       return refuse(other, why);
-    if (painted.condition ||
+    if (overwritten.condition ||
         !llvm::all_of(other.getResults(),
                       [](Value result) { return result.use_empty(); }))
       return refuse(other, "this reads the pixel");
@@ -262,7 +272,7 @@ bool SelectionFinder::findCarried(Selection &selection) {
       return refuse(other, "this may be another pixel than the one tested");
     if (!addKept(selection, image))
       return refuse(other, "this number is updated twice");
-    behind.insert(other);
+    after.insert(other);
     selection.carried.push_back(other);
   }
   // The same for each site.
@@ -323,7 +333,7 @@ bool SelectionFinder::find() {
   if (!checkOthers())
     return false;
   for (UpdateOp update : updates)
-    if (!behind.contains(update) && !addSite(update))
+    if (!after.contains(update) && !addSite(update))
       return false;
   llvm::DenseSet<StringAttr> known;
   for (const Selection &selection : selections)

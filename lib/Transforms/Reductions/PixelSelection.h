@@ -49,7 +49,7 @@ struct Selection {
   /// The first one has the key, the others are overwritten where it changes.
   llvm::SmallVector<Image> images;
   llvm::SmallVector<Site> sites;
-  /// What is overwritten behind them, where they have kept new numbers.
+  /// What is overwritten after them, where they have kept new numbers.
   llvm::SmallVector<UpdateOp> carried;
 };
 
@@ -88,8 +88,8 @@ private:
   KernelOp kernel;
   const llvm::SetVector<mlir::StringAttr> &others;
   llvm::SmallVector<UpdateOp> updates;
-  llvm::DenseSet<mlir::StringAttr> names;   ///< Of all images.
-  llvm::DenseSet<mlir::Operation *> behind; ///< Updates that are carried.
+  llvm::DenseSet<mlir::StringAttr> names;  ///< Of all images.
+  llvm::DenseSet<mlir::Operation *> after; ///< Updates that are carried.
 };
 
 } // namespace piko

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-privatize: what a kernel only reduces to, each thread reduces to a copy
-// of its own.
+// of its own (privatization of reductions).
+//
+// Copies are combined for runs of elements that have been written to, by a
+// function that convert-piko-to-llvm makes for the field and the kind, and hold
+// what changes nothing after that, as the next launch needs them
+// (runtime/cpu/PrivateCopies.h).
 
 #include "Reductions/UnitWork.h"
 

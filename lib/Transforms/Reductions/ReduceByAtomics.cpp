@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-reduce-by-atomics: lets blocks share a bin that is the whole domain, or
-// threads what has come to a bin along a local edge. A kernel, or work in it,
-// whose primitives select what pixels keep becomes several, which take the same
-// primitives:
+// threads what has come to a bin along a local edge. Updates of a pixel run in
+// order of lineage, so that one block, or one thread, would run it. A kernel,
+// or work in it, whose primitives select what pixels keep becomes several,
+// which take the same primitives:
 //   1. for each word of the key, one that finds out by an atomic minimum what
 //      comes first in each pixel; it does nothing else;
 //   2. the kernel itself, in which a primitive changes the pixels that are its.
 //      Nobody else does, so that no order shows.
+// So what is carried is computed once for each pixel (a visibility buffer).
 
 #include "Reductions/CommutingUpdates.h"
 #include "Reductions/SelectionWords.h"
@@ -40,7 +42,7 @@ struct ReduceByAtomicsPass
   void runOnWork(KernelOp kernel, ItemsOp items, StageOp stage);
 };
 
-/// Makes several kernels of one, or, behind a local edge, several pieces of
+/// Makes several kernels of one, or, after a local edge, several pieces of
 /// work.
 class WorkSplitter {
 public:
@@ -124,7 +126,7 @@ void WorkSplitter::createPass(int64_t pass) {
     of->reduce(site, std::min(pass, of->size() - 1));
 }
 
-/// In front of the kernel's launch.
+/// Before the kernel's launch.
 void WorkSplitter::clearWords() {
   SmallVector<Attribute> images;
   for (const SelectionWords &of : words)

@@ -3,6 +3,12 @@
 // piko-reduce-updates: lets threads share a bin that is the whole domain, where
 // primitives only select what pixels keep, each with images of its own, or
 // where the order in which they change them does not show.
+//
+// Updates of a pixel run in order of lineage, so that one thread runs such a
+// bin otherwise, unless each primitive updates one pixel that is known before
+// (piko-own-pixels). What threads hold is combined by a function that
+// convert-piko-to-llvm makes; the first thread has the state itself
+// (runtime/cpu/PrivateImages.h).
 
 #include "Deferral/InternalImage.h"
 #include "Reductions/CommutingUpdates.h"
@@ -129,16 +135,16 @@ void ImagePrivatizer::noteUnit(const Selection::Site &site, ImageOp unitImage,
                                Value shared) {
   Location loc = UpdateOp(site.update).getLoc();
   auto [update, isKept] = createKept(site);
-  scf::IfOp behind;
+  scf::IfOp after;
   if (isKept)
     for (Operation *user : isKept.getUsers())
       if (auto branch = dyn_cast<scf::IfOp>(user))
-        behind = branch;
+        after = branch;
   builder.setInsertionPointAfter(isKept ? isKept.getDefiningOp() : update);
-  if (isKept && !behind)
-    behind = scf::IfOp::create(builder, loc, isKept, /*withElse=*/false);
-  if (behind)
-    builder.setInsertionPointToStart(behind.thenBlock());
+  if (isKept && !after)
+    after = scf::IfOp::create(builder, loc, isKept, /*withElse=*/false);
+  if (after)
+    builder.setInsertionPointToStart(after.thenBlock());
   auto branch = scf::IfOp::create(builder, loc, shared, /*withElse=*/false);
   builder.setInsertionPointToStart(branch.thenBlock());
   auto note =

@@ -130,7 +130,7 @@ public:
   Value getTest(Value isOne, Value more) {
     return isOne ? arith::AndIOp::create(builder, loc, isOne, more) : more;
   }
-  /// Whether a word of the pixel is `word`, or behind it.
+  /// Whether a word of the pixel is `word`, or after it.
   Value compare(ImageOp image, arith::CmpIPredicate predicate, Value word) {
     return arith::CmpIOp::create(builder, loc, predicate, word,
                                  pixel.loadFrom(builder, image));
@@ -225,7 +225,7 @@ void SelectionWords::reduce(const Selection::Site &site, int64_t pass) const {
   for (int64_t before = 0; before < pass; ++before)
     isOne = rewriter.getTest(
         isOne, rewriter.compare(images[before], P::eq, words[before]));
-  // Most are behind what is there already: a load is less than a change.
+  // Most are after what is there already: a load is less than a change.
   isOne = rewriter.getTest(isOne,
                            rewriter.compare(images[pass], P::ult, words[pass]));
   OpBuilder inside = rewriter.when(isOne);

@@ -26,7 +26,7 @@ public:
   void reduce(const Selection::Site &site, int64_t pass) const;
   /// Makes of a site what keeps the numbers of the primitive that is first.
   void resolve(const Selection::Site &site) const;
-  /// Makes stores of what is carried behind it.
+  /// Makes stores of what is carried after it.
   static void resolveCarried(UpdateOp update);
 
 private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-form-units, for each kernel:
-//   1. build the loops over units of work and their cells, or the calls of a
+//   1. build the loops over units of work and their buckets, or the calls of a
 //      process phase that takes lists;
 //   2. move work on a bin into the innermost, one after another;
 //   3. turn emissions and placements into what goes to the unit's writers.
@@ -88,9 +88,9 @@ void UnitFormer::run() {
 }
 
 scf::ForOp UnitFormer::createUnitLoop() {
-  auto cells = UnitCellsOp::create(rewriter, loc, bins, unit);
-  unitsEnd = cells.getEnd();
-  return scf::ForOp::create(rewriter, loc, cells.getBegin(), cells.getEnd(),
+  auto buckets = UnitBucketsOp::create(rewriter, loc, bins, unit);
+  unitsEnd = buckets.getEnd();
+  return scf::ForOp::create(rewriter, loc, buckets.getBegin(), buckets.getEnd(),
                             constant(1));
 }
 
@@ -99,7 +99,7 @@ void UnitFormer::convertSource(ItemsOp items) {
   items->moveBefore(loop.getBody()->getTerminator());
   rewriter.setInsertionPoint(items);
   auto range =
-      CellRangeOp::create(rewriter, loc, bins, unit, loop.getInductionVar());
+      BucketRangeOp::create(rewriter, loc, bins, unit, loop.getInductionVar());
   convertItems(items, bins, range.getBegin(), range.getEnd(),
                writers.lookup(items.getStageAttr()));
 }
@@ -126,23 +126,23 @@ void UnitFormer::convertBins(BinsOp over) {
   bool takesList = first.takesList();
   Value bin = takesList
                   ? CallBinOp::create(rewriter, loc, bins, at).getResult()
-                  : CellBinOp::create(rewriter, loc, bins, at).getResult();
-  Block *behind = loop.getBody();
+                  : BucketBinOp::create(rewriter, loc, bins, at).getResult();
+  Block *after = loop.getBody();
   rewriter.inlineBlockBefore(over.getBodyBlock(), end, bin);
   rewriter.eraseOp(over);
   if (takesList && !locals.empty()) {
     rewriter.setInsertionPointAfter(first);
     Operation *next = first->getNextNode();
-    behind = createBinEnd(at, bin);
-    behind->getOperations().splice(
-        std::prev(behind->end()), loop.getBody()->getOperations(),
+    after = createBinEnd(at, bin);
+    after->getOperations().splice(
+        std::prev(after->end()), loop.getBody()->getOperations(),
         next->getIterator(), std::prev(loop.getBody()->end()));
   }
   rewriter.setInsertionPoint(first);
   if (takesList) {
     convertList(cast<ListsOp>(*first), bins, at, writer);
   } else {
-    auto range = CellRangeOp::create(rewriter, loc, bins, unit, at);
+    auto range = BucketRangeOp::create(rewriter, loc, bins, unit, at);
     if (hasTiles && !visitsEmptyBins(locals))
       passOverEmptyBins(range, loop);
     convertItems(cast<ItemsOp>(*first), bins, range.getBegin(), range.getEnd(),
@@ -152,11 +152,11 @@ void UnitFormer::convertBins(BinsOp over) {
     convertLocal(local);
 }
 
-/// Puts what a bin runs behind a test of whether there is something in it: a
+/// Puts what a bin runs under a test of whether there is something in it: a
 /// tile would be filled and written for nothing.
-void UnitFormer::passOverEmptyBins(CellRangeOp range, scf::ForOp loop) {
+void UnitFormer::passOverEmptyBins(BucketRangeOp range, scf::ForOp loop) {
   Block *body = loop.getBody();
-  range->moveBefore(body, std::next(body->begin())); // behind its bin
+  range->moveBefore(body, std::next(body->begin())); // after its bin
   rewriter.setInsertionPointAfter(range);
   Value isFilled =
       arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ne,
@@ -245,7 +245,7 @@ void UnitFormer::convertLocal(WorkOpInterface local) {
   auto next = NextOp::create(rewriter, at, writer);
   rewriter.setInsertionPoint(next);
   if (auto lists = dyn_cast<ListsOp>(*local)) {
-    auto calls = UnitCellsOp::create(rewriter, at, from, zero);
+    auto calls = UnitBucketsOp::create(rewriter, at, from, zero);
     Value one = arith::ConstantIndexOp::create(rewriter, at, 1);
     auto loop =
         scf::ForOp::create(rewriter, at, calls.getBegin(), calls.getEnd(), one);
@@ -253,7 +253,7 @@ void UnitFormer::convertLocal(WorkOpInterface local) {
     convertList(lists, from, loop.getInductionVar(), writer);
     return;
   }
-  auto range = CellRangeOp::create(rewriter, at, from, zero, zero);
+  auto range = BucketRangeOp::create(rewriter, at, from, zero, zero);
   local->moveBefore(next);
   if (auto again = local->removeDiscardableAttr(marks::again)) {
     around->setDiscardableAttr(marks::again, again);

@@ -32,7 +32,7 @@ public:
     op->moveBefore(atEnd().getBlock()->getTerminator());
   }
   Value getIteration() { return loop.getInductionVar(); }
-  /// What is appended next comes behind what `splitter` has built since.
+  /// What is appended next comes after what `splitter` has built since.
   void close() { loop = {}; }
 
 private:
@@ -187,7 +187,7 @@ void LoopSplitter::splitSort(SortOp op, Piece &piece) {
   readFrom(op.getIndex(), ranks);
 }
 
-/// A number for the key of a cell, the same for no two cells.
+/// A number for the key of a cell: cells with the same one are one group.
 static Value createGroupNumber(OpBuilder &builder, Location loc,
                                ValueRange key) {
   Type i64 = builder.getI64Type();
@@ -565,9 +565,9 @@ LogicalResult LoopSplitter::connectResult(Value value, scf::ForOp piece) {
                      "live across a barrier, but got type ")
            << value.getType();
   Value array = slots->add(value.getType());
-  OpBuilder behind(value.getContext());
-  behind.setInsertionPointAfterValue(value);
-  Slots::store(behind, value.getLoc(), value, array, piece.getInductionVar());
+  OpBuilder after(value.getContext());
+  after.setInsertionPointAfterValue(value);
+  Slots::store(after, value.getLoc(), value, array, piece.getInductionVar());
   replaceUses(value, piece, [&](OpBuilder &at, Value iteration) {
     return Slots::load(at, value.getLoc(), value.getType(), array, iteration);
   });
@@ -635,12 +635,12 @@ void LoopSplitter::orderEmissions() {
   if (emitting.size() < 2 && inOrder)
     return;
   OpBuilder at = OpBuilder::atBlockBegin(slots->inside()->getBlock());
-  DeferBeginOp::create(at, loc, writer, count);
+  ReorderBeginOp::create(at, loc, writer, count);
   at.setInsertionPoint(slots->inside());
-  DeferEndOp::create(at, loc, writer);
+  ReorderEndOp::create(at, loc, writer);
   for (scf::ForOp piece : emitting) {
     at.setInsertionPointToStart(piece.getBody());
-    DeferIterationOp::create(at, loc, writer, piece.getInductionVar());
+    ReorderIterationOp::create(at, loc, writer, piece.getInductionVar());
   }
 }
 
@@ -648,7 +648,7 @@ void LoopSplitter::orderEmissions() {
 // Failures
 //===----------------------------------------------------------------------===//
 
-/// What comes behind such a barrier has no meaning: the way there was
+/// What comes after such a barrier has no meaning: the way there was
 /// iteration 0's, and slots may never have been written.
 void LoopSplitter::stopAtDisagreement() {
   if (failures.empty())

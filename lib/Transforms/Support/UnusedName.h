@@ -10,7 +10,7 @@
 namespace piko {
 
 /// A name that no symbol of the pipeline has: the stem, or one with a number
-/// behind it, from 1 on.
+/// after it, from 1 on.
 std::string getUnusedName(PipelineOp pipeline, const llvm::Twine &stem);
 
 } // namespace piko

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-distribute-loops: loop distribution of what a phase computes of a
-// primitive in front of its own loops, which becomes vectors of primitives.
+// piko-distribute-loops: loop fission of what a phase computes of a primitive
+// before its own loops, which becomes vectors of primitives.
+//
+// What is as quickly read or cast again is not put into arrays. What conditions
+// guard counts as needed by every second primitive.
 
 #include "Support/StateAccess.h"
 #include "Vectorize/Cost/LaneCycles.h"
@@ -55,7 +58,7 @@ private:
   /// The operations of the first loop, in their order.
   SmallVector<Operation *> findSlice() const;
   void createTables();
-  /// The first loop, in front of the original one.
+  /// The first loop, before the original one.
   scf::ForOp writeFirst(Value lower, Value upper);
   bool isWorthwhile(const IterationLanes &lanes);
   void writeVectors(const IterationLanes &lanes, Value lower, Value upper);
@@ -69,7 +72,7 @@ private:
   OpBuilder builder;
   CodeBuilder at;
   llvm::SetVector<Operation *> moved;
-  llvm::DenseSet<Operation *> varying;     ///< From turn to turn.
+  llvm::DenseSet<Operation *> varying;     ///< From iteration to iteration.
   llvm::DenseSet<Operation *> ofPrimitive; ///< Not by its position alone.
   /// A row of one of few arrays, which a processor reads by one register.
   struct Table {
@@ -100,7 +103,7 @@ static bool isForLanes(Operation *op) {
           matchPattern(op->getOperand(1), m_Constant()));
 }
 
-/// `isSure`: the primitive's turn comes there.
+/// `isSure`: the primitive's iteration comes there.
 bool Distributor::mayMove(Operation *op, bool isSure) {
   bool isKnown = llvm::all_of(op->getOperands(), [&](Value operand) {
     return loop.isDefinedOutsideOfLoop(operand) ||
@@ -376,10 +379,10 @@ void Distributor::run() {
       scf::ForOp::create(builder, at.loc, begin, end, at.index(laneCount));
   builder.setInsertionPointToStart(blocks.getBody());
   Value lower = blocks.getInductionVar();
-  Value behind =
+  Value after =
       arith::AddIOp::create(builder, at.loc, lower, at.index(laneCount),
                             arith::IntegerOverflowFlags::nsw);
-  Value upper = at.min(behind, end);
+  Value upper = at.min(after, end);
   scf::ForOp first = writeFirst(lower, upper);
   IterationLanes lanes(first, laneCount);
   if (!isWorthwhile(lanes)) {
@@ -394,8 +397,8 @@ void Distributor::run() {
   loop.setUpperBound(upper);
   builder.setInsertionPoint(loop);
   readTables(lower);
-  remarkStage(loop) << "what follows from a primitive in front of the loops of "
-                       "its turn is computed for "
+  remarkStage(loop) << "what follows from a primitive before the loops of "
+                       "its iteration is computed for "
                     << laneCount << " primitives at once";
 }
 

@@ -1,4 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// A loop becomes vectors where its schedule says so, or where these are surely
+// faster than scalar code, by the estimates of Vectorize/Cost. Scalar code is
+//
+//   * for a row of a box, which mostly has few pixels, what the row takes, and
+//     not what as many iterations as there are lanes would;
+//   * for primitives with a loop along a buffer, what LLVM makes of that loop,
+//     vectors along it (LoopStreams);
+//   * for primitives with loops that iterate equally often for all of them, as
+//     over the rows of an image, those loops as vectors.
+//
+// Where the dependences between iterations of inner loops take longer than
+// their operations, primitives, and loops in order, have two vectors of 16
+// lanes, of which one is under way while the other one waits (LaneLatency).
+//
+// With a window, estimates within that factor of each other leave the choice to
+// the runtime; within less of it where bodies are large, or rows of boxes.
 
 #include "Vectorize/LaneCandidate.h"
 
@@ -99,7 +116,7 @@ bool piko::isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount) {
   return cost.vectors < (laneCount == 8 ? sure : tie) * cost.serial;
 }
 
-/// Only loops that turn as often for all primitives count, as those over the
+/// Only loops that iterate as often for all primitives count, as those over the
 /// rows of an image: others may be short.
 double LaneCandidate::getCostInside(const IterationLanes &lanes,
                                     const IterationLanes::Cost &cost) {
@@ -110,9 +127,9 @@ double LaneCandidate::getCostInside(const IterationLanes &lanes,
         isFallback(*inner->getParentRegion()) ||
         !mayRunInOrder(inner, lanes.getLaneCount()))
       return WalkResult::advance();
-    IterationLanes turns(inner, lanes.getLaneCount());
-    IterationLanes::Cost part = turns.getCost();
-    if (turns.getRefusal().at || !part.computes ||
+    IterationLanes iterations(inner, lanes.getLaneCount());
+    IterationLanes::Cost part = iterations.getCost();
+    if (iterations.getRefusal().at || !part.computes ||
         !isSurelyFaster(part, lanes.getLaneCount()))
       return WalkResult::advance();
     inside -= cost.loops.lookup(inner) * (1 - part.vectors / part.serial);
@@ -228,7 +245,7 @@ void LaneCandidate::remarkVectors(const IterationLanes &lanes,
            << " at once";
   for (Location nest : flat.nests)
     remark.attachNote(nest) << "lanes go on in this loop each by itself, "
-                               "however often the loop inside turns";
+                               "however often the loop inside iterates";
   for (Location nest : flat.ordered)
     remark.attachNote(nest) << "lanes take turns to go through this loop, "
                                "because an order shows of what it does";

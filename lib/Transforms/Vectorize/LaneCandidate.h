@@ -26,7 +26,7 @@ public:
   /// held in two versions.
   explicit LaneCandidate(mlir::scf::ForOp loop, double window = 1);
 
-  /// Whether lanes are given its turns.
+  /// Whether lanes are given its iterations.
   bool isChosen() const { return chosen; }
   /// Whether it becomes vectors, which a remark tells; `flat` is what lanes may
   /// do instead.
@@ -66,8 +66,8 @@ private:
   double getCostInside(const IterationLanes &lanes,
                        const IterationLanes::Cost &cost);
 
-  /// What the scalar version takes for as many turns as lanes have, of which
-  /// the row of a box may have fewer; in cycles.
+  /// What the scalar version takes for as many iterations as lanes have, of
+  /// which the row of a box may have fewer; in cycles.
   double getScalarCost(const IterationLanes &lanes,
                        const IterationLanes::Cost &cost, const Cycles &cycles);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-reduce-strength: vectors that grow by the same from turn to turn become
-// induction variables.
+// piko-reduce-strength: vectors that grow by the same from iteration to
+// iteration become induction variables.
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
@@ -29,7 +29,7 @@ struct ReduceStrengthPass : piko::impl::ReduceStrengthBase<ReduceStrengthPass> {
   void runOnOperation() override;
 };
 
-/// How a value changes from turn to turn of a loop.
+/// How a value changes from iteration to iteration of a loop.
 enum class Growth {
   None,   ///< Not at all.
   Linear, ///< By a number that stays the same.
@@ -58,8 +58,8 @@ private:
   /// How many operations on vectors a root takes that no earlier one has.
   int64_t countOperations(Value root, llvm::DenseSet<Operation *> &seen);
   int64_t countRegisters(Value root) const;
-  /// In front of the loop: a value that does not grow, and what another one is
-  /// in the first turn and grows by.
+  /// Before the loop: a value that does not grow, and what another one is
+  /// in the first iteration and grows by.
   Value getInvariant(Value value);
   Value getFirst(Value value);
   Value getDifference(Value value);

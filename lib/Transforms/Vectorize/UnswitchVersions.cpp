@@ -28,7 +28,7 @@ struct UnswitchVersionsPass
 };
 } // namespace
 
-/// The decisions, made in front of a choice, that its scalar version depends
+/// The decisions, made before a choice, that its scalar version depends
 /// on: each is whether a loop in it runs by vectors.
 static llvm::SetVector<Value> findInnerDecisions(scf::IfOp choice) {
   llvm::SetVector<Value> captures, inner;

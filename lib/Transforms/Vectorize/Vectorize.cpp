@@ -1,6 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-vectorize: primitives, or the iterations of a parallel loop, as lanes.
+//   1. Parallel loops whose iterations meet become lanes in lockstep, if they
+//      have up to 16 (IterationBarriers), or are cut as piko-split-loops cuts
+//      them.
+//   2. Of each loop that lanes may share, a copy is looked at (IterationLanes),
+//      flattened where that pays (LaneNests), and compared with scalar code
+//      (LaneCandidate).
+//   3. Loops that are written in order, and stand in no vector, become vectors
+//      of iterations as well, by stream compaction where their work stands
+//      under a condition (SequentialLoops).
+//   4. What is decided for is written (IterationWriter).
+//
+// A parallel loop that turns out to have fewer iterations than a quarter of the
+// lanes, or two, runs as it was: a vector takes about as long.
+//
+// With a window, up to six loops of a kernel are held in both versions (loop
+// multiversioning), of which the runtime measures which is faster. Loops in the
+// scalar version are candidates of their own, so that primitives, iterations or
+// neither may have lanes. What the schedule specifies is not measured.
+//
+// The CPU target sets the number of lanes from the processor
+// (lib/Target/CPU/Processor.cpp): 16 with AVX-512 (F, BW, DQ and VL), 8 with
+// AVX2, else 4. Of the passes before this one, only piko-narrow-integers knows
+// it. An object for several processors has code of each width.
 
 #include "Piko/Transforms/Storage/LoopSplitter.h"
 #include "Piko/Transforms/Storage/ParallelLoops.h"
@@ -53,7 +76,7 @@ private:
   bool vectorizeInOrder(Operation *op);
   bool vectorizeCompacted(scf::ForOp loop);
   /// Makes vectors of a loop, with what is left of `scalar`, which does the
-  /// same, for a few turns, or unless `takesVectors`.
+  /// same, for a few iterations, or unless `takesVectors`.
   void vectorize(const IterationLanes &lanes, scf::ForOp scalar,
                  Value takesVectors = {});
   /// Whether a loop may be held in two versions.
@@ -97,7 +120,7 @@ static std::optional<CountedWhile> findCountedWhile(scf::WhileOp loop) {
   using P = arith::CmpIPredicate;
   CountedWhile counting{variable.getArgNumber(), compare.getRhs(),
                         compare.getPredicate() == P::sle};
-  // Up to a number, from 0: one below it would take 2^63 turns.
+  // Up to a number, from 0: one below it would take 2^63 iterations.
   bool isUntil = compare.getPredicate() == P::ne &&
                  counting.bound.getType().isInteger(64) &&
                  matchPattern(loop.getInits()[counting.variable], m_Zero());
@@ -151,8 +174,8 @@ static scf::ForOp countLoop(scf::WhileOp loop, const CountedWhile &counting) {
   return made;
 }
 
-/// Makes loops that count loops of which one knows how often they turn, in 64
-/// bits.
+/// Makes loops that count loops of which one knows how often they iterate, in
+/// 64 bits.
 static void countLoops(scf::ForOp root) {
   SmallVector<scf::WhileOp> loops;
   root.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
@@ -163,7 +186,7 @@ static void countLoops(scf::ForOp root) {
 
 /// With fewer iterations a loop runs as it was: a vector takes about as long as
 /// this many.
-static int64_t getLeastTurns(int64_t laneCount) {
+static int64_t getLeastIterations(int64_t laneCount) {
   return std::max<int64_t>(laneCount / 4, 2);
 }
 
@@ -190,7 +213,7 @@ void VectorizePass::vectorize(const IterationLanes &lanes, scf::ForOp scalar,
   Type type = loop.getUpperBound().getType();
   Value least = arith::ConstantOp::create(
       builder, loc,
-      builder.getIntegerAttr(type, getLeastTurns(lanes.getLaneCount())));
+      builder.getIntegerAttr(type, getLeastIterations(lanes.getLaneCount())));
   Value count = arith::SubIOp::create(builder, loc, loop.getUpperBound(),
                                       loop.getLowerBound());
   Value isLong = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::sge,
@@ -323,7 +346,7 @@ static void printSensitivities(scf::ForOp loop, int64_t number,
 }
 
 /// Makes room for two versions of a loop: `loop`, whose lanes are given
-/// iterations of loops in it, is the scalar one; the others are in front.
+/// iterations of loops in it, is the scalar one; the others are before.
 static void splitVersions(Value takesVectors, scf::ForOp loop,
                           ArrayRef<scf::ForOp> vectors) {
   OpBuilder builder(loop);
@@ -386,8 +409,8 @@ static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
     remark << ", of those that have something to do";
 }
 
-/// Vectorizes those turns of a loop that have something to do, if most work is
-/// theirs.
+/// Vectorizes those iterations of a loop that have something to do, if most
+/// work is theirs.
 bool VectorizePass::vectorizeCompacted(scf::ForOp loop) {
   std::optional<Compaction> made = compact(loop);
   if (!made)

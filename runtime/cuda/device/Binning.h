@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Binning.h - Puts items into cells ----------------------------------===//
+//===- Binning.h - Puts items into buckets
+//----------------------------------===//
 //
-// Pairs of item and cell are sorted by cell; the sort is stable, so that each
-// cell has its items in lineage order.
+// Pairs of item and bucket are sorted by bucket; the sort is stable, so that
+// each bucket has its items in lineage order.
 //
 //===----------------------------------------------------------------------===//
 
@@ -25,23 +26,24 @@ public:
   uint32_t *rank = nullptr;
   int64_t rankSize = 0;
 
-  /// Behind a barrier; all results are uniform. In front of one, unless all is
-  /// in one cell.
+  /// After a barrier; all results are uniform. Before one, unless all is
+  /// in one bucket.
   void run() {
-    offsets = grid_.take<int64_t>(args_.shape.cells + 1);
+    offsets = grid_.take<int64_t>(args_.shape.buckets + 1);
     if (grid_.hasFailed())
       return;
     if (args_.shape.placed)
       return binPairs();
     positions = stream_.count;
-    grid_.forEach(args_.shape.cells + 1,
-                  [&](int64_t cell) { offsets[cell] = beginOf(cell); });
+    grid_.forEach(args_.shape.buckets + 1,
+                  [&](int64_t bucket) { offsets[bucket] = beginOf(bucket); });
   }
 
-  /// Whether everything is in the first cell, which is known without a barrier.
+  /// Whether everything is in the first bucket, which is known without a
+  /// barrier.
   bool isInOne() const { return !args_.shape.placed; }
-  int64_t beginOf(int64_t cell) const {
-    return !isInOne() ? offsets[cell] : cell == 0 ? 0 : positions;
+  int64_t beginOf(int64_t bucket) const {
+    return !isInOne() ? offsets[bucket] : bucket == 0 ? 0 : positions;
   }
 
 private:
@@ -56,18 +58,18 @@ private:
                : 64 - __builtin_clzll(static_cast<uint64_t>(numbers - 1));
   }
 
-  /// Pairs by `cells`; those without a cell come last.
-  KeyedNumbers sortBy(int64_t cellsInOne) {
+  /// Pairs by `buckets`; those without a bucket come last.
+  KeyedNumbers sortBy(int64_t bucketsInOne) {
     KeyedNumbers from = takeNumbers(), to = takeNumbers();
     if (grid_.hasFailed())
       return from;
-    int64_t groups = ceilDivide(args_.shape.cells, cellsInOne);
+    int64_t groups = ceilDivide(args_.shape.buckets, bucketsInOne);
     grid_.forEach(stream_.pairCount, [&](int64_t k) {
       uint32_t pair = stream_.pairs[k];
-      from.keys[k] =
-          pair == noCell
-              ? static_cast<uint32_t>(groups)
-              : static_cast<uint32_t>((pair & ~PIKOIR_FIRST_CELL) / cellsInOne);
+      from.keys[k] = pair == noBucket
+                         ? static_cast<uint32_t>(groups)
+                         : static_cast<uint32_t>((pair & ~PIKOIR_FIRST_BUCKET) /
+                                                 bucketsInOne);
       from.numbers[k] = static_cast<uint32_t>(k);
     });
     grid_.sync();
@@ -86,11 +88,11 @@ private:
            ++k)
         itemOf[k] = static_cast<uint32_t>(i);
     });
-    grid_.forEach(args_.shape.cells + 1, [&](int64_t cell) {
-      offsets[cell] = firstOf(sorted.keys, cell);
+    grid_.forEach(args_.shape.buckets + 1, [&](int64_t bucket) {
+      offsets[bucket] = firstOf(sorted.keys, bucket);
     });
     grid_.sync();
-    positions = offsets[args_.shape.cells];
+    positions = offsets[args_.shape.buckets];
     grid_.forEach(positions,
                   [&](int64_t p) { order[p] = itemOf[sorted.numbers[p]]; });
     bool byBin = args_.collects && args_.tiles > 1;
@@ -99,12 +101,12 @@ private:
     grid_.sync();
   }
 
-  /// The first place of a key that is not below `cell`.
-  int64_t firstOf(const uint32_t *keys, int64_t cell) const {
+  /// The first place of a key that is not below `bucket`.
+  int64_t firstOf(const uint32_t *keys, int64_t bucket) const {
     int64_t low = 0, high = stream_.pairCount;
     while (low < high) {
       int64_t middle = (low + high) / 2;
-      if (keys[middle] < cell)
+      if (keys[middle] < bucket)
         low = middle + 1;
       else
         high = middle;

@@ -15,7 +15,7 @@
 
 namespace piko::cuda {
 
-/// In front of a loop that is entered at several stages, or has a stack.
+/// Before a loop that is entered at several stages, or has a stack.
 class Enter : FrameTask {
 public:
   explicit Enter(const EnterArgs &args)
@@ -128,16 +128,16 @@ private:
       queue.ready = queue.count;
   }
 
-  /// On the stack; what is in no cell goes nowhere.
+  /// On the stack; what is in no bucket goes nowhere.
   static Waiting describe(const LoopEntry &entry, const Stream &stream,
                           int64_t i, uint32_t place) {
     uint32_t begin = stream.pairs ? stream.pairStarts[i] : 0,
-             cells = stream.pairs ? stream.pairStarts[i + 1] - begin : 0;
+             buckets = stream.pairs ? stream.pairStarts[i + 1] - begin : 0;
     bool isPlaced =
-        !entry.shape.placed || (cells > 0 && stream.pairs[begin] != noCell);
+        !entry.shape.placed || (buckets > 0 && stream.pairs[begin] != noBucket);
     return {stream.items + i * entry.shape.recordSize,
             stream.pairs + begin,
-            cells,
+            buckets,
             place,
             isPlaced ? entry.member : -1,
             /*group=*/-1,

@@ -8,8 +8,8 @@
 
 namespace piko::cuda {
 
-/// As in rt::noCell: a source's primitive that has none.
-constexpr uint32_t noCell = 0xffffffffu;
+/// As in rt::noBucket: a source's primitive that has none.
+constexpr uint32_t noBucket = 0xffffffffu;
 
 inline const uint8_t *payload(const pikoir_entry *entry) {
   return reinterpret_cast<const uint8_t *>(entry + 1);
@@ -19,7 +19,7 @@ inline const pikoir_entry *entryAt(int64_t address) {
   return reinterpret_cast<const pikoir_entry *>(address);
 }
 
-/// Where the entry behind `entry` is, past links.
+/// Where the entry after `entry` is, past links.
 inline int64_t skipLinks(int64_t at, int64_t end) {
   while (at != end && entryAt(at)->kind == PIKOIR_ENTRY_LINK)
     at = *reinterpret_cast<const int64_t *>(&entryAt(at)->number);
@@ -30,16 +30,16 @@ inline int64_t skipLinks(int64_t at, int64_t end) {
 ///   emit(mine)        a record of the port, or of another one of the stage
 ///   keep(record)      a record of the port that counts; of a source's
 ///                     AssignBin, that a primitive begins: null
-///   place(cell)       its next cell, above those before
-///   insert(cell)      a cell that is not, and none of those before
+///   place(bucket)       its next bucket, above those before
+///   insert(bucket)      a bucket that is not, and none of those before
 ///   next()            the position has ended
 ///   fail()            what no join can do
 /// The rules are those of pikoir_append, pikoir_place and pikoir_next.
 template <class Sink> class SpanReader {
 public:
   SpanReader(const JoinInput &input, const Shape &shape, Sink &sink)
-      : input_(input), placed_(shape.placed), cells_(shape.cells), sink_(sink) {
-  }
+      : input_(input), placed_(shape.placed), buckets_(shape.buckets),
+        sink_(sink) {}
 
   void read(const pikoir_span &span) {
     for (int64_t at = skipLinks(span.begin, span.end); at != span.end;
@@ -51,9 +51,9 @@ public:
       case PIKOIR_ENTRY_RECORD:
         readRecord(entry);
         break;
-      case PIKOIR_ENTRY_CELL:
+      case PIKOIR_ENTRY_BUCKET:
         if (entry->number == input_.port)
-          readCell(entry, span);
+          readBucket(entry, span);
         break;
       case PIKOIR_ENTRY_NEXT:
         readNext();
@@ -76,35 +76,35 @@ private:
       sink_.keep(entry);
   }
 
-  void readCell(const pikoir_entry *entry, const pikoir_span &span) {
-    auto cell = *reinterpret_cast<const int64_t *>(payload(entry));
-    if (static_cast<uint64_t>(cell) >= static_cast<uint64_t>(cells_) ||
+  void readBucket(const pikoir_entry *entry, const pikoir_span &span) {
+    auto bucket = *reinterpret_cast<const int64_t *>(payload(entry));
+    if (static_cast<uint64_t>(bucket) >= static_cast<uint64_t>(buckets_) ||
         (!record_ && !input_.isSource))
       return sink_.fail();
-    if (cell == last_)
+    if (bucket == last_)
       return;
     if (last_ < 0) {
-      firstCell_ = entry;
+      firstBucket_ = entry;
       sink_.keep(record_);
     }
-    if (cell > last_) {
-      last_ = cell;
-      sink_.place(static_cast<uint32_t>(cell));
-    } else if (!isKnown(entry, cell, span)) {
-      sink_.insert(static_cast<uint32_t>(cell));
+    if (bucket > last_) {
+      last_ = bucket;
+      sink_.place(static_cast<uint32_t>(bucket));
+    } else if (!isKnown(entry, bucket, span)) {
+      sink_.insert(static_cast<uint32_t>(bucket));
     }
   }
 
-  /// Whether a cell is among those of the record before `entry`.
-  bool isKnown(const pikoir_entry *entry, int64_t cell,
+  /// Whether a bucket is among those of the record before `entry`.
+  bool isKnown(const pikoir_entry *entry, int64_t bucket,
                const pikoir_span &span) const {
     auto end = reinterpret_cast<int64_t>(entry);
-    for (auto at = reinterpret_cast<int64_t>(firstCell_); at != end;
+    for (auto at = reinterpret_cast<int64_t>(firstBucket_); at != end;
          at = skipLinks(at + entryAt(at)->bytes, span.end)) {
       const pikoir_entry *before = entryAt(at);
-      if (before->kind == PIKOIR_ENTRY_CELL && before->stage == input_.stage &&
-          before->number == input_.port &&
-          *reinterpret_cast<const int64_t *>(payload(before)) == cell)
+      if (before->kind == PIKOIR_ENTRY_BUCKET &&
+          before->stage == input_.stage && before->number == input_.port &&
+          *reinterpret_cast<const int64_t *>(payload(before)) == bucket)
         return true;
     }
     return false;
@@ -114,7 +114,7 @@ private:
     if (input_.isSource) {
       if (last_ < 0) {
         sink_.keep(nullptr);
-        sink_.place(noCell);
+        sink_.place(noBucket);
       }
       last_ = -1;
     }
@@ -123,9 +123,9 @@ private:
 
   const JoinInput &input_;
   bool placed_;
-  int64_t cells_;
+  int64_t buckets_;
   Sink &sink_;
-  const pikoir_entry *record_ = nullptr, *firstCell_ = nullptr;
+  const pikoir_entry *record_ = nullptr, *firstBucket_ = nullptr;
   int64_t last_ = -1;
 };
 

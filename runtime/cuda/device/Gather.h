@@ -5,7 +5,8 @@
 //   1. count    what it has, and, where the order of positions is another one,
 //               what each slot has;
 //   2. scan     gives each span, and each slot, its place;
-//   3. place    copies records and cells there, with keys where they are asked
+//   3. place    copies records and buckets there, with keys where they are
+//   asked
 //               for.
 //
 //===----------------------------------------------------------------------===//
@@ -48,11 +49,11 @@ private:
   template <class Sink> void read(Sink &sink, int64_t span) const {
     SpanReader<Sink>(input_, shape_, sink).read(spans_.list[span]);
   }
-  /// Whether it is of a stage behind a local edge: what that emits is in the
+  /// Whether it is of a stage after a local edge: what that emits is in the
   /// order of bins.
   bool isHosted() const { return input_.stage >= 0; }
-  /// The cell of a position.
-  int64_t cellOf(int64_t position) const;
+  /// The bucket of a position.
+  int64_t bucketOf(int64_t position) const;
 
   Grid &grid_;
   const Shape &shape_;
@@ -63,7 +64,7 @@ private:
   int32_t keyWidth_;
   bool byPosition_;
   int64_t recordCount_ = 0, pairCount_ = 0;
-  uint32_t *records_ = nullptr, *pairs_ = nullptr; ///< In front of each span.
+  uint32_t *records_ = nullptr, *pairs_ = nullptr; ///< Before each span.
   uint32_t *all_ = nullptr;   ///< With those of other ports.
   uint32_t *slots_ = nullptr; ///< Of each span, where it is asked for.
   Spans::Places recordPlaces_{}, pairPlaces_{};
@@ -96,7 +97,7 @@ struct Gather::SlotCounter {
     if (pairs)
       __atomic_fetch_add(&pairs[slot], 1u, __ATOMIC_RELAXED);
   }
-  void insert(uint32_t cell) { place(cell); }
+  void insert(uint32_t bucket) { place(bucket); }
   void next() { ++slot; }
   void fail() {}
 };
@@ -108,7 +109,7 @@ struct Gather::Placer {
   uint64_t *keys;
   uint32_t record, pair, ordinal; ///< Those before, in the order of emission.
   int64_t slot;
-  uint32_t *first = nullptr, *end = nullptr; ///< Cells of the last record.
+  uint32_t *first = nullptr, *end = nullptr; ///< Buckets of the last record.
 
   void emit(bool) { ++ordinal; }
   void next() { ++slot; }
@@ -136,20 +137,20 @@ struct Gather::Placer {
     if (gather.siblings_)
       gather.siblings_->describe(gather.lineage_, to, slot, ordinal - 1);
   }
-  void place(uint32_t cell) {
+  void place(uint32_t bucket) {
     if (!pairs)
       return;
-    *end = first == end ? cell | PIKOIR_FIRST_CELL : cell;
+    *end = first == end ? bucket | PIKOIR_FIRST_BUCKET : bucket;
     ++end;
     ++pair;
   }
-  void insert(uint32_t cell) {
-    *first &= ~PIKOIR_FIRST_CELL;
+  void insert(uint32_t bucket) {
+    *first &= ~PIKOIR_FIRST_BUCKET;
     uint32_t *at = end++;
-    for (; at != first && at[-1] > cell; --at)
+    for (; at != first && at[-1] > bucket; --at)
       *at = at[-1];
-    *at = cell;
-    *first |= PIKOIR_FIRST_CELL;
+    *at = bucket;
+    *first |= PIKOIR_FIRST_BUCKET;
     ++pair;
   }
 
@@ -170,13 +171,13 @@ struct Gather::Placer {
     for (int32_t w = 0; w < from.keys.width; ++w)
       to[w] = from.keys.word(item, w);
     to[from.keys.width] =
-        static_cast<uint64_t>(gather.cellOf(slot)) << 32 | ordinal;
+        static_cast<uint64_t>(gather.bucketOf(slot)) << 32 | ordinal;
   }
 };
 
-inline int64_t Gather::cellOf(int64_t position) const {
+inline int64_t Gather::bucketOf(int64_t position) const {
   const int64_t *offsets = from_.input.offsets;
-  int64_t low = 0, high = from_.cells; // offsets[low] <= position
+  int64_t low = 0, high = from_.buckets; // offsets[low] <= position
   while (high - low > 1) {
     int64_t middle = (low + high) / 2;
     (offsets[middle] <= position ? low : high) = middle;

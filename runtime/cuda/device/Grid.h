@@ -68,7 +68,7 @@ public:
       body(i);
   }
 
-  /// A barrier of all that work: what was written in front of it is seen
+  /// A barrier of all that work: what was written before it is seen
   /// behind.
   void sync() {
     if (isAlone_)
@@ -96,7 +96,7 @@ public:
     top_ += bytes;
     return reinterpret_cast<T *>(top_ - bytes);
   }
-  /// The same, zero behind a barrier.
+  /// The same, zero after a barrier.
   uint32_t *takeZeros(int64_t count) {
     uint32_t *words = take<uint32_t>(count);
     if (words)
@@ -111,7 +111,7 @@ public:
   /// Exclusive prefix sums of several arrays at a time: numbersOf(i, numbers)
   /// gives element i of each, from what all threads see. `sums` has the arrays,
   /// or null, and `totals` their sums, uniform. Fails where one has more than
-  /// 32 bits. In front of a barrier.
+  /// 32 bits. Before a barrier.
   template <int32_t Count, class NumbersOf>
   void scan(int64_t n, uint32_t *const (&sums)[Count], int64_t (&totals)[Count],
             const NumbersOf &numbersOf);

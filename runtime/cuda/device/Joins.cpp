@@ -58,7 +58,7 @@ public:
 private:
   /// About how much there is to do; of what comes in without bins, a unit each.
   static int64_t workOf(const JoinArgs &args, bool clears) {
-    int64_t work = args.shape.placed || args.everyBin ? args.shape.cells : 0;
+    int64_t work = args.shape.placed || args.everyBin ? args.shape.buckets : 0;
     int64_t pixels = clears ? 1 : 0;
     for (int32_t d = 0; d < args.rank; ++d)
       pixels *= args.domain[d];
@@ -173,7 +173,7 @@ private:
     kernel.log = args_.frame->log;
     kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = units;
-    kernel.cells = args_.shape.cells;
+    kernel.buckets = args_.shape.buckets;
     kernel.rank = bins.rank;
     kernel.rankSize = bins.rankSize;
     kernel.keys = args_.shape.keyWidth > 0 ? stream.keys : KeyWords{};
@@ -193,7 +193,7 @@ private:
 
   const JoinArgs &args_;
   /// In the kernel's first run, of all strips: the first thread counts it
-  /// behind the last barrier, so that it is asked before.
+  /// after the last barrier, so that it is asked before.
   bool clears_;
   Grid grid_;
   bool isFirstRun_; ///< Of a strip.
@@ -231,7 +231,7 @@ extern "C" [[clang::nvptx_kernel]] void piko_join(const JoinArgs *args) {
   Join(*args).run();
 }
 
-/// Behind a kernel that may run again: keeps what it has left for others. This,
+/// After a kernel that may run again: keeps what it has left for others. This,
 /// and what follows, is launched as a join is.
 extern "C" [[clang::nvptx_kernel]] void piko_queue(const QueueArgs *args) {
   Queuer(*args).run();

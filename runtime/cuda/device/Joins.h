@@ -24,8 +24,8 @@ constexpr int32_t mostScans = 4;  ///< At a time.
 
 struct KernelState;
 
-/// Elements that lie behind what a grid is told: as many as it says.
-template <class T, class Args> const T *behind(const Args *args) {
+/// Elements that lie after what a grid is told: as many as it says.
+template <class T, class Args> const T *after(const Args *args) {
   return reinterpret_cast<const T *>(args + 1);
 }
 
@@ -66,7 +66,7 @@ struct KeyWords {
 struct Stream {
   const uint8_t *items;
   int64_t count, pairCount;
-  const uint32_t *pairs;      ///< Cells, the first of each item marked.
+  const uint32_t *pairs;      ///< Buckets, the first of each item marked.
   const uint32_t *pairStarts; ///< The first pair of each item, and the end.
   KeyWords keys;
 };
@@ -118,7 +118,7 @@ struct LoopState {
 /// On the stack of a loop.
 struct Waiting {
   const uint8_t *item;
-  const uint32_t *pairs; ///< Of the cells that it has still to go to.
+  const uint32_t *pairs; ///< Of the buckets that it has still to go to.
   uint32_t pairCount;
   uint32_t entry; ///< What came in that it comes from.
   int32_t member; ///< Of the loop, that takes it; -1: it leaves, ...
@@ -139,7 +139,7 @@ struct StackState {
   pikoir_unit_log unitLog;
   uint32_t *numbers; ///< Room for those of a step.
   int64_t found, foundLeft;
-  uint32_t children, cells;
+  uint32_t children, buckets;
 };
 
 /// Rounds of a cycle whose stages collect.
@@ -165,7 +165,7 @@ struct KernelState {
   pikoir_input input;
   pikoir_log log;
   int64_t logBegin; ///< Where its log's cursor began.
-  int64_t cells;
+  int64_t buckets;
   const uint32_t *rank; ///< Position to place in emission order; null = same.
   int64_t rankSize;
   KeyWords keys; ///< Of items.
@@ -180,7 +180,7 @@ struct KernelState {
 
 /// What streams of a stage's primitives have in common.
 struct Shape {
-  int64_t recordSize, cells;
+  int64_t recordSize, buckets;
   int32_t placed;
   int32_t keyWidth; ///< Of the stage's items; 0: none are needed.
 };
@@ -213,9 +213,9 @@ struct JoinClear {
 
 /// How the positions of a stage become units.
 enum Cutting : int32_t {
-  CutCells, ///< Each cell by itself, ...
-  CutBins,  ///< ... as its bin says.
-  CutNone   ///< All are one unit.
+  CutBuckets, ///< Each bucket by itself, ...
+  CutBins,    ///< ... as its bin says.
+  CutNone     ///< All are one unit.
 };
 
 /// What a schedule says of a bin.
@@ -244,7 +244,7 @@ struct JoinArgs {
   int32_t rank;        ///< Of the domain; four entries each, unused = 1 or 0.
   int64_t domain[4], binSize[4], grid[4];
 
-  const JoinInput *inputs() const { return behind<JoinInput>(this); }
+  const JoinInput *inputs() const { return after<JoinInput>(this); }
   const JoinClear *clears() const {
     return reinterpret_cast<const JoinClear *>(inputs() + inputCount);
   }
@@ -262,7 +262,7 @@ struct LoopEntry {
 
 struct StackArgs;
 
-/// In front of a loop that is entered at several stages, or has a stack.
+/// Before a loop that is entered at several stages, or has a stack.
 struct EnterArgs {
   FrameState *frame;
   LoopState *loop;
@@ -271,7 +271,7 @@ struct EnterArgs {
   int32_t keyWidth; ///< Of what comes in.
   int32_t entryCount, inputCount;
 
-  const LoopEntry *entries() const { return behind<LoopEntry>(this); }
+  const LoopEntry *entries() const { return after<LoopEntry>(this); }
   const JoinInput *inputs() const {
     return reinterpret_cast<const JoinInput *>(entries() + entryCount);
   }
@@ -294,7 +294,7 @@ struct StackMember {
   int32_t firstPort, portCount;
 };
 
-/// Behind each position of such a loop.
+/// After each position of such a loop.
 struct StackArgs {
   FrameState *frame;
   LoopState *loop;
@@ -303,13 +303,13 @@ struct StackArgs {
   int64_t limit; ///< Of hops.
   int32_t memberCount, portCount;
 
-  const StackMember *members() const { return behind<StackMember>(this); }
+  const StackMember *members() const { return after<StackMember>(this); }
   const QueuePort *ports() const {
     return reinterpret_cast<const QueuePort *>(members() + memberCount);
   }
 };
 
-/// Behind a kernel that may run several times: what it has emitted is to wait.
+/// After a kernel that may run several times: what it has emitted is to wait.
 struct QueueArgs {
   FrameState *frame;
   KernelState *kernel;
@@ -317,20 +317,20 @@ struct QueueArgs {
   int64_t number;
   int32_t portCount;
 
-  const QueuePort *ports() const { return behind<QueuePort>(this); }
+  const QueuePort *ports() const { return after<QueuePort>(this); }
 };
 
-/// Behind each wave of a loop, or each round of a cycle.
+/// After each wave of a loop, or each round of a cycle.
 struct StepArgs {
   FrameState *frame;
   LoopState *loop;   ///< Of a wave.
   CycleState *cycle; ///< Of a round.
   int64_t number;
-  int64_t limit; ///< Of waves or rounds behind the first.
+  int64_t limit; ///< Of waves or rounds after the first.
   int32_t queueCount;
 
   /// What waits for the next one.
-  QueueState *const *queues() const { return behind<QueueState *>(this); }
+  QueueState *const *queues() const { return after<QueueState *>(this); }
 };
 
 /// All that has left a loop to one stage.
@@ -340,7 +340,7 @@ struct ExitGroup {
   int32_t keyWidth; ///< Of the edge; 0: it needs none.
 };
 
-/// Behind a loop.
+/// After a loop.
 struct LeaveArgs {
   FrameState *frame;
   LoopState *loop;
@@ -348,7 +348,7 @@ struct LeaveArgs {
   int32_t keyWidth; ///< Of what comes in.
   int32_t groupCount;
 
-  const ExitGroup *groups() const { return behind<ExitGroup>(this); }
+  const ExitGroup *groups() const { return after<ExitGroup>(this); }
 };
 
 /// A queue of what leaves the strips.
@@ -357,14 +357,14 @@ struct StripQueue {
   int64_t recordSize;
 };
 
-/// Behind a strip.
+/// After a strip.
 struct StripArgs {
   FrameState *frame;
   StripState *strip;
   int64_t number;
   int32_t leavingCount, insideCount, cycleCount;
 
-  const StripQueue *leaving() const { return behind<StripQueue>(this); }
+  const StripQueue *leaving() const { return after<StripQueue>(this); }
   /// Empty when a strip ends.
   QueueState *const *inside() const {
     return reinterpret_cast<QueueState *const *>(leaving() + leavingCount);

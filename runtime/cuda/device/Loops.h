@@ -15,7 +15,7 @@
 
 namespace piko::cuda {
 
-/// Behind a wave: places, and whether another one follows.
+/// After a wave: places, and whether another one follows.
 class Wave : FrameTask {
 public:
   explicit Wave(const StepArgs &args)
@@ -80,7 +80,7 @@ private:
   LoopState &loop_;
 };
 
-/// Behind a round of a cycle.
+/// After a round of a cycle.
 class Round : FrameTask {
 public:
   explicit Round(const StepArgs &args)
@@ -105,7 +105,7 @@ private:
   const StepArgs &args_;
 };
 
-/// Behind a loop: what has left it goes to the queues of its stages, in order.
+/// After a loop: what has left it goes to the queues of its stages, in order.
 class Leave : FrameTask {
 public:
   explicit Leave(const LeaveArgs &args)

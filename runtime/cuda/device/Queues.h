@@ -36,7 +36,7 @@ inline void push(Grid &grid, QueueState &queue, const Chunk &chunk) {
   grid.sync();
 }
 
-/// Puts chunks one behind the other.
+/// Puts chunks one after the other.
 class Concatenation {
 public:
   Concatenation(Grid &grid, const Shape &shape, int32_t keyWidth, bool isInLoop)
@@ -96,7 +96,7 @@ private:
                  grid_.take<uint32_t>(stream.count)};
   }
 
-  /// Behind so many items and pairs.
+  /// After so many items and pairs.
   void copy(const Chunk &chunk, int64_t item, int64_t pair) {
     const Stream &from = chunk.stream;
     int64_t size = shape_.recordSize;
@@ -146,7 +146,7 @@ inline int64_t workOf(const KernelState &kernel) {
          (kernel.log.cursor - kernel.logBegin) / perEntry;
 }
 
-/// What runs between kernels and takes memory behind the latest one's.
+/// What runs between kernels and takes memory after the latest one's.
 class FrameTask {
 public:
   FrameTask(FrameState &frame, int64_t number, int64_t work)
@@ -181,7 +181,7 @@ private:
   int64_t number_;
 };
 
-/// Behind a kernel: see QueueArgs.
+/// After a kernel: see QueueArgs.
 class Queuer : FrameTask {
 public:
   explicit Queuer(const QueueArgs &args)

@@ -23,7 +23,7 @@ public:
   /// barriers.
   void run(uint32_t *childCounts);
 
-  /// Records in front of each span, and the slot in which it begins.
+  /// Records before each span, and the slot in which it begins.
   const uint32_t *before() const { return before_; }
   const uint32_t *slots() const { return slots_; }
   /// Says of record `to` where it stands: number `ordinal` of all records, in

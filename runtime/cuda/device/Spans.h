@@ -8,7 +8,7 @@
 
 namespace piko::cuda {
 
-/// The directories of all units of a kernel, one behind the other.
+/// The directories of all units of a kernel, one after the other.
 class Spans {
 public:
   Spans(Grid &grid, const KernelState &from) : grid_(grid), from_(from) {}
@@ -21,7 +21,7 @@ public:
 
   /// Between two barriers.
   void find();
-  /// The slot in which each span begins; in front of it, so many positions end.
+  /// The slot in which each span begins; before it, so many positions end.
   uint32_t *findSlots(Grid &grid, const uint32_t *ends) const;
 
   int64_t slots() const {
@@ -35,7 +35,7 @@ public:
   }
 
   /// Where what slots have emitted begins: in the order of emission, and, by
-  /// rank, in that of positions. Behind the last, their sum.
+  /// rank, in that of positions. After the last, their sum.
   struct Places {
     uint32_t *emitted, *starts;
   };
@@ -45,7 +45,7 @@ public:
 private:
   int64_t firstSlotOf(int64_t unit) const {
     const pikoir_unit &u = from_.input.units[unit];
-    return from_.input.calls ? u.cell_begin : u.begin;
+    return from_.input.calls ? u.bucket_begin : u.begin;
   }
 
   Grid &grid_;

@@ -35,7 +35,7 @@ public:
     now_.numbers = grid_.take<uint32_t>(2 * mostAtOnce);
     for (int32_t m = 0; m < args_.memberCount; ++m) {
       const StackMember &member = args_.members()[m];
-      auto *offsets = grid_.take<int64_t>(member.shape.cells + 1);
+      auto *offsets = grid_.take<int64_t>(member.shape.buckets + 1);
       if (Grid::isFirst())
         member.kernel->input.offsets = offsets;
     }
@@ -45,7 +45,7 @@ public:
   void push();
   /// Finds the position that is to run next. Between two barriers.
   void next();
-  /// Says what is next; by the first thread, behind all of that.
+  /// Says what is next; by the first thread, after all of that.
   void publish(FrameState &frame);
 
 private:
@@ -68,7 +68,7 @@ private:
 
   bool pushFew(const StackMember &member);
   void countFew(const StackMember &member, const Few &few);
-  void writeFew(const StackMember &member, const Few &few, uint32_t *cells);
+  void writeFew(const StackMember &member, const Few &few, uint32_t *buckets);
   void makeRoom(int64_t more);
   void makeRoomForExits(int64_t more);
   void pushPort(const QueuePort &port, const Spans &spans,
@@ -151,11 +151,11 @@ struct Stack::Few {
 };
 
 struct Stack::Counter {
-  uint32_t records = 0, cells = 0;
+  uint32_t records = 0, buckets = 0;
   void emit(bool) { ++records; }
   void keep(const pikoir_entry *) {}
-  void place(uint32_t) { ++cells; }
-  void insert(uint32_t) { ++cells; }
+  void place(uint32_t) { ++buckets; }
+  void insert(uint32_t) { ++buckets; }
   void next() {}
   void fail() {}
 };
@@ -163,8 +163,8 @@ struct Stack::Counter {
 struct Stack::Pusher {
   const Stack &stack;
   const QueuePort &port;
-  Waiting *end;    ///< Behind the first one's place.
-  uint32_t *cells; ///< Room for more.
+  Waiting *end;      ///< After the first one's place.
+  uint32_t *buckets; ///< Room for more.
   uint32_t ordinal = 0, received = 0;
   Waiting *last = nullptr;
 
@@ -174,20 +174,20 @@ struct Stack::Pusher {
   }
   void keep(const pikoir_entry *entry) {
     last = end - ordinal;
-    *last = {payload(entry),     cells,       0,
+    *last = {payload(entry),     buckets,     0,
              stack.now_.entry,   port.member, port.group,
              stack.now_.hops + 1};
   }
-  void place(uint32_t cell) {
-    *cells++ = last->pairCount++ == 0 ? cell | PIKOIR_FIRST_CELL : cell;
+  void place(uint32_t bucket) {
+    *buckets++ = last->pairCount++ == 0 ? bucket | PIKOIR_FIRST_BUCKET : bucket;
   }
-  void insert(uint32_t cell) {
-    uint32_t *at = cells++, *first = at - last->pairCount++;
-    *first &= ~PIKOIR_FIRST_CELL;
-    for (; at != first && at[-1] > cell; --at)
+  void insert(uint32_t bucket) {
+    uint32_t *at = buckets++, *first = at - last->pairCount++;
+    *first &= ~PIKOIR_FIRST_BUCKET;
+    for (; at != first && at[-1] > bucket; --at)
       *at = at[-1];
-    *at = cell;
-    *first |= PIKOIR_FIRST_CELL;
+    *at = bucket;
+    *first |= PIKOIR_FIRST_BUCKET;
   }
   void next() {}
   void fail() { stack.grid_.failFrame(); }
@@ -201,42 +201,42 @@ inline bool Stack::pushFew(const StackMember &member) {
   if (Grid::isFirst())
     countFew(member, few);
   grid_.sync();
-  int64_t records = state_.children, count = state_.cells;
+  int64_t records = state_.children, count = state_.buckets;
   if (records > fewRecords)
     return false;
   makeRoom(records);
-  auto *cells = grid_.take<uint32_t>(count);
+  auto *buckets = grid_.take<uint32_t>(count);
   if (grid_.hasFailed())
     return true;
   if (Grid::isFirst())
-    writeFew(member, few, cells);
+    writeFew(member, few, buckets);
   now_.count += records;
   grid_.sync();
   return true;
 }
 
 inline void Stack::countFew(const StackMember &member, const Few &few) {
-  state_.children = state_.cells = 0;
+  state_.children = state_.buckets = 0;
   for (int32_t p = 0; p < member.portCount; ++p) {
     Counter counter;
     few.read(args_.ports()[member.firstPort + p], counter);
     state_.children = counter.records; // of all ports
-    state_.cells += counter.cells;
+    state_.buckets += counter.buckets;
   }
 }
 
 inline void Stack::writeFew(const StackMember &member, const Few &few,
-                            uint32_t *cells) {
+                            uint32_t *buckets) {
   uint32_t records = state_.children;
   Waiting *begin = now_.waiting + now_.count;
   for (uint32_t i = 0; i < records; ++i)
     begin[i] = nobody;
   for (int32_t p = 0; p < member.portCount; ++p) {
     const QueuePort &port = args_.ports()[member.firstPort + p];
-    Pusher pusher{*this, port, begin + records, cells};
+    Pusher pusher{*this, port, begin + records, buckets};
     few.read(port, pusher);
     *port.input.received += pusher.received;
-    cells = pusher.cells;
+    buckets = pusher.buckets;
   }
 }
 
@@ -261,7 +261,7 @@ inline void Stack::push() {
   makeRoom(count);
   if (grid_.hasFailed())
     return;
-  // Some may go to no port, or to no cell.
+  // Some may go to no port, or to no bucket.
   grid_.forEach(count,
                 [&](int64_t i) { now_.waiting[now_.count + i] = nobody; });
   grid_.sync();
@@ -281,11 +281,11 @@ inline void Stack::pushPort(const QueuePort &port, const Spans &spans,
   const uint32_t *children = gather.lineage().children;
   grid_.forEach(from.count, [&](int64_t i) {
     uint32_t begin = from.pairs ? from.pairStarts[i] : 0,
-             cells = from.pairs ? from.pairStarts[i + 1] - begin : 0;
+             buckets = from.pairs ? from.pairStarts[i + 1] - begin : 0;
     now_.waiting[end - 1 - children[i]] = {from.items +
                                                i * port.shape.recordSize,
                                            from.pairs + begin,
-                                           cells,
+                                           buckets,
                                            now_.entry,
                                            port.member,
                                            port.group,
@@ -357,21 +357,21 @@ inline void Stack::publish(FrameState &frame) {
   if (loop_.again) {
     Waiting &top = fromTop(0);
     const StackMember &member = args_.members()[top.member];
-    int64_t cell = 0;
+    int64_t bucket = 0;
     if (member.shape.placed) {
-      cell = *top.pairs++ & ~PIKOIR_FIRST_CELL;
+      bucket = *top.pairs++ & ~PIKOIR_FIRST_BUCKET;
       --top.pairCount;
     }
     now_.count -= top.pairCount == 0;
     now_.running = top.member;
     now_.entry = top.entry;
     now_.hops = top.hops;
-    now_.unit = {cell, cell + 1, 0, 1, -1};
+    now_.unit = {bucket, bucket + 1, 0, 1, -1};
     now_.unitLog = {};
     KernelState &kernel = *member.kernel;
     auto *offsets = const_cast<int64_t *>(kernel.input.offsets);
-    offsets[cell] = 0;
-    offsets[cell + 1] = 1;
+    offsets[bucket] = 0;
+    offsets[bucket + 1] = 1;
     kernel.input = {top.item,     1,       nullptr, offsets, &state_.unit, 1,
                     member.tiles, nullptr, 0,       0,       nullptr};
     kernel.log = frame.log;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Step.cpp - Behind a position of a loop with a stack ----------------===//
+//===- Step.cpp - After a position of a loop with a stack ----------------===//
 //
 // A module of its own, for grids of one warp: there is little to do, and others
 // would wait at barriers.

@@ -2,9 +2,9 @@
 //===- Strips.h - From one strip of a source to the next ------------------===//
 //
 // What a strip has taken is free when it has ended, but for what has left it
-// and waits in queues. From the second strip on that is copied behind all
+// and waits in queues. From the second strip on that is copied after all
 // memory of the strip, and from there to its front, where it stays; what is
-// behind it is the next strip's, which finds there what was. The first strip's
+// after it is the next strip's, which finds there what was. The first strip's
 // memory stays: nobody has noted where it begins.
 //
 //===----------------------------------------------------------------------===//
@@ -16,7 +16,7 @@
 
 namespace piko::cuda {
 
-/// Behind a strip.
+/// After a strip.
 class Strip : FrameTask {
 public:
   explicit Strip(const StripArgs &args) : Strip(args, bytesOf(args)) {}
@@ -103,7 +103,7 @@ private:
   /// Copies what stays to the front. There it does not reach to where it is
   /// copied from: its pieces are some of those of the strip.
   void compact() {
-    int64_t behind = addressOf(grid_.take<uint8_t>(bytes_)), to = behind;
+    int64_t after = addressOf(grid_.take<uint8_t>(bytes_)), to = after;
     if (grid_.hasFailed())
       return;
     forPieces(args_, [&](auto *&pointer, int64_t bytes) {
@@ -111,10 +111,10 @@ private:
       to += bytes;
     });
     grid_.sync();
-    copy(behind, strip_.memory, bytes_);
+    copy(after, strip_.memory, bytes_);
   }
 
-  /// By the first thread, behind all of that.
+  /// By the first thread, after all of that.
   void publishMemory() {
     FrameState &frame = *args_.frame;
     frame.highest = larger(frame.highest, grid_.top());

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Units.h - Cuts positions into calls and units ----------------------===//
 //
-// A unit is what a block takes at a time: a cell, or a part of one that may be
-// split; where Process takes a list, a call, or all of a bin. How units are cut
-// is never seen in a result.
+// A unit is what a block takes at a time: a bucket, or a part of one that may
+// be split; where Process takes a list, a call, or all of a bin. How units are
+// cut is never seen in a result.
 //
 //===----------------------------------------------------------------------===//
 
@@ -18,43 +18,43 @@ class Cutter {
 public:
   Cutter(Grid &grid, const JoinArgs &args, const Binning &bins, bool everyBin)
       : grid_(grid), args_(args), bins_(bins), everyBin_(everyBin),
-        cells_(args.shape.cells) {}
+        buckets_(args.shape.buckets) {}
 
   pikoir_unit *units = nullptr;
   pikoir_call *calls = nullptr;
   int64_t unitCount = 0, callCount = 0;
 
-  /// Behind the binning; what the kernel takes is there in front of a barrier.
+  /// After the binning; what the kernel takes is there before a barrier.
   /// All results are uniform.
   void run() {
     if (args_.takesList)
       return cutCalls();
     switch (args_.cutting) {
     case CutNone:
-      return addWhole(cells_, bins_.positions > 0 || args_.visitsAll);
+      return addWhole(buckets_, bins_.positions > 0 || args_.visitsAll);
     case CutBins:
-      return cutCells([&](int64_t cell) {
-        const BinCut &cut = args_.cuts[cell / args_.tiles];
+      return cutBuckets([&](int64_t bucket) {
+        const BinCut &cut = args_.cuts[bucket / args_.tiles];
         return cut.splits ? unitSize(cut.tileSplit) : 0;
       });
-    case CutCells:
+    case CutBuckets:
       int64_t size = args_.splits ? unitSize(args_.tileSplit) : 0;
-      return cutCells([&](int64_t) { return size; });
+      return cutBuckets([&](int64_t) { return size; });
     }
   }
 
 private:
-  /// What each cell is cut into.
+  /// What each bucket is cut into.
   struct Pieces {
-    int64_t count, cells;
-    const uint32_t *starts; ///< Null: the first cell has all.
+    int64_t count, buckets;
+    const uint32_t *starts; ///< Null: the first bucket has all.
 
-    int64_t startOf(int64_t cell) const {
-      return starts ? starts[cell] : cell == 0 ? 0 : count;
+    int64_t startOf(int64_t bucket) const {
+      return starts ? starts[bucket] : bucket == 0 ? 0 : count;
     }
     /// The last one that begins at or before a piece.
-    int64_t cellOf(int64_t piece) const {
-      int64_t low = 0, high = starts ? cells : 1;
+    int64_t bucketOf(int64_t piece) const {
+      int64_t low = 0, high = starts ? buckets : 1;
       while (high - low > 1) {
         int64_t middle = (low + high) / 2;
         (starts[middle] <= piece ? low : high) = middle;
@@ -63,40 +63,40 @@ private:
     }
   };
 
-  /// Each cell has piecesOf(cell), which is 0 for empty ones but where
-  /// `everyCell` is true.
-  template <class Count> Pieces cut(const Count &piecesOf, bool everyCell) {
-    if (bins_.isInOne() && !everyCell)
-      return {piecesOf(0), cells_, nullptr};
-    auto *starts = grid_.take<uint32_t>(cells_ + 1);
-    int64_t count = grid_.scan(cells_ + 1, starts, [&](int64_t cell) {
-      return cell < cells_ ? static_cast<uint32_t>(piecesOf(cell)) : 0;
+  /// Each bucket has piecesOf(bucket), which is 0 for empty ones but where
+  /// `everyBucket` is true.
+  template <class Count> Pieces cut(const Count &piecesOf, bool everyBucket) {
+    if (bins_.isInOne() && !everyBucket)
+      return {piecesOf(0), buckets_, nullptr};
+    auto *starts = grid_.take<uint32_t>(buckets_ + 1);
+    int64_t count = grid_.scan(buckets_ + 1, starts, [&](int64_t bucket) {
+      return bucket < buckets_ ? static_cast<uint32_t>(piecesOf(bucket)) : 0;
     });
-    return {count, cells_, starts};
+    return {count, buckets_, starts};
   }
 
-  int64_t countOf(int64_t cell) const {
-    return bins_.beginOf(cell + 1) - bins_.beginOf(cell);
+  int64_t countOf(int64_t bucket) const {
+    return bins_.beginOf(bucket + 1) - bins_.beginOf(bucket);
   }
 
-  /// Units have as many positions as sizeOf(cell), or, if that is 0, all.
-  template <class Size> void cutCells(const Size &sizeOf) {
+  /// Units have as many positions as sizeOf(bucket), or, if that is 0, all.
+  template <class Size> void cutBuckets(const Size &sizeOf) {
     Pieces all = cut(
-        [&](int64_t cell) {
-          int64_t count = countOf(cell), size = sizeOf(cell),
+        [&](int64_t bucket) {
+          int64_t count = countOf(bucket), size = sizeOf(bucket),
                   least = args_.visitsAll ? 1 : 0;
           return larger(least, size > 0 ? ceilDivide(count, size)
                                         : smaller<int64_t>(count, 1));
         },
         args_.visitsAll);
     addUnits(all.count, [&](int64_t u) -> pikoir_unit {
-      int64_t cell = all.cellOf(u), begin = bins_.beginOf(cell),
-              end = bins_.beginOf(cell + 1), size = sizeOf(cell);
+      int64_t bucket = all.bucketOf(u), begin = bins_.beginOf(bucket),
+              end = bins_.beginOf(bucket + 1), size = sizeOf(bucket);
       if (size > 0) {
-        begin += (u - all.startOf(cell)) * size;
+        begin += (u - all.startOf(bucket)) * size;
         end = smaller(end, begin + size);
       }
-      return {cell, cell + 1, begin, end, -1};
+      return {bucket, bucket + 1, begin, end, -1};
     });
   }
 
@@ -141,7 +141,7 @@ private:
         },
         everyBin_);
     auto callAt = [&](int64_t c) -> pikoir_call {
-      int64_t bin = all.cellOf(c), batch = batchOf(bin, countOf(bin)),
+      int64_t bin = all.bucketOf(c), batch = batchOf(bin, countOf(bin)),
               begin = bins_.beginOf(bin) + (c - all.startOf(bin)) * batch;
       return {bin, begin, smaller(bins_.beginOf(bin + 1), begin + batch)};
     };
@@ -163,7 +163,7 @@ private:
         },
         everyBin_);
     addUnits(bins.count, [&](int64_t u) {
-      int64_t bin = bins.cellOf(u);
+      int64_t bin = bins.bucketOf(u);
       return unitOf(all.startOf(bin), all.startOf(bin + 1));
     });
   }
@@ -172,7 +172,7 @@ private:
   const JoinArgs &args_;
   const Binning &bins_;
   bool everyBin_;
-  int64_t cells_;
+  int64_t buckets_;
 };
 
 } // namespace piko::cuda

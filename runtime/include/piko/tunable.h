@@ -21,7 +21,7 @@ namespace piko {
 namespace detail {
 
 /// What PIKO_TUNED says, for T = void. The compiler, whose precompiled piko.h
-/// is the same for all settings, specializes it in front of the user's text.
+/// is the same for all settings, specializes it before the user's text.
 template <class T>
 inline constexpr const char *tunedText =
 #ifdef PIKO_TUNED
@@ -65,7 +65,7 @@ consteval bool isWord(const char *text, const char *word) {
   return !*word && (!*text || *text == ';');
 }
 
-/// Reads digits, and counts them; the text then points behind them.
+/// Reads digits, and counts them; the text then points after them.
 consteval int readDigits(const char *&text, unsigned long long &number) {
   int count = 0;
   for (; *text >= '0' && *text <= '9'; ++text, ++count)

@@ -38,7 +38,7 @@
 //   if (int32_t status = pikoir_status(p)) return status;
 //
 // A stage of a local edge runs in the kernel of its producer: for a unit its
-// writer is opened as well, and behind the positions of a bin
+// writer is opened as well, and after the positions of a bin
 //
 //   const pikoir_input *in = pikoir_begin_local(w, port);
 //   for each position, or call, of in:  Process, with the stage's own writer
@@ -74,11 +74,11 @@ PIKORT_API const pikoir_state *pikoir_get_state(pikort_pipeline *p, int32_t id);
 /// left. On one that is neither, a status.
 PIKORT_API void pikoir_clear(pikort_pipeline *p, int32_t id);
 /// Four entries each, x first, unused = 1. A grid counts the stage's bins; a
-/// cell grid the owner tiles of one bin. cell = bin * tiles + tile, both
+/// bucket grid the owner tiles of one bin. bucket = bin * tiles + tile, both
 /// row-major with x fastest.
 PIKORT_API const int64_t *pikoir_domain(pikort_pipeline *p);
 PIKORT_API const int64_t *pikoir_grid(pikort_pipeline *p, int32_t stage);
-PIKORT_API const int64_t *pikoir_cell_grid(pikort_pipeline *p, int32_t stage);
+PIKORT_API const int64_t *pikoir_tile_grid(pikort_pipeline *p, int32_t stage);
 /// How many threads should run a kernel's units; asked after its begin.
 PIKORT_API int32_t pikoir_threads(pikort_pipeline *p);
 /// The calling thread's number in its parallel region, and how many there are.
@@ -89,17 +89,17 @@ PIKORT_API int32_t pikoir_status(pikort_pipeline *p);
 
 // --- kernels ----------------------------------------------------------------
 
-/// Positions [begin, end), which lie in cells [cell_begin, cell_end). A unit
-/// has several cells only if it has them whole; units partition the positions
-/// in order. In a LIST stage cell_begin and cell_end are indices of calls, and
-/// units partition the calls; those of one bin are in one unit unless it is
-/// SPLIT. `owner` is the thread that has its home, modulo the size of the team,
-/// for bins of DIRECT_MAP and parts of the only one: ascending, and as many
-/// positions for each; -1 if any thread may run it, -2 if the first one must,
-/// as for bins of SERIALIZE.
+/// Positions [begin, end), which lie in buckets [bucket_begin, bucket_end). A
+/// unit has several buckets only if it has them whole; units partition the
+/// positions in order. In a LIST stage bucket_begin and bucket_end are indices
+/// of calls, and units partition the calls; those of one bin are in one unit
+/// unless it is SPLIT. `owner` is the thread that has its home, modulo the size
+/// of the team, for bins of DIRECT_MAP and parts of the only one: ascending,
+/// and as many positions for each; -1 if any thread may run it, -2 if the first
+/// one must, as for bins of SERIALIZE.
 typedef struct pikoir_unit {
-  int64_t cell_begin;
-  int64_t cell_end;
+  int64_t bucket_begin;
+  int64_t bucket_end;
   int64_t begin;
   int64_t end;
   int64_t owner;
@@ -115,13 +115,14 @@ typedef struct pikoir_call {
 
 /// A stage's input: valid until pikoir_end.
 typedef struct pikoir_input {
-  const uint8_t *items;   ///< Where records lie.
-  int64_t count;          ///< Positions: pairs of item and cell.
-  const uint32_t *order;  ///< Position to the record's place; null = identity.
-  const int64_t *offsets; ///< First position of each cell, cells + 1 entries.
+  const uint8_t *items;  ///< Where records lie.
+  int64_t count;         ///< Positions: pairs of item and bucket.
+  const uint32_t *order; ///< Position to the record's place; null = identity.
+  const int64_t
+      *offsets; ///< First position of each bucket, buckets + 1 entries.
   const pikoir_unit *units;
   int64_t unit_count;
-  int64_t tiles; ///< Cells in a bin.
+  int64_t tiles; ///< Buckets in a bin.
   /// Of a LIST stage, in order of bin and batch; null and 0 for all others.
   const pikoir_call *calls;
   int64_t call_count;
@@ -129,18 +130,18 @@ typedef struct pikoir_input {
   void *cursors;  ///< The runtime's: which units threads have taken.
 } pikoir_input;
 
-/// One port of a writer. The fields up to `cells` are the fast path's: see the
-/// inline functions below, which generated code repeats.
+/// One port of a writer. The fields up to `buckets` are the fast path's: see
+/// the inline functions below, which generated code repeats.
 typedef struct pikoir_port {
-  uint8_t *cursor;       ///< Where the next record goes.
-  uint8_t *limit;        ///< There is room if cursor <= limit.
-  int64_t size;          ///< Bytes of a record.
-  int64_t emitted;       ///< Records appended, with those in no cell.
-  int64_t kept;          ///< Placed ports: records that have a cell.
-  uint32_t *cell_cursor; ///< Where the next cell of a record is noted.
-  uint32_t *cell_end;    ///< There is room if cell_cursor < cell_end.
-  int64_t last_cell;     ///< Of the latest record; -1 = it has none yet.
-  int64_t cells;         ///< Cells of the consumer; 0 = a port without places.
+  uint8_t *cursor;         ///< Where the next record goes.
+  uint8_t *limit;          ///< There is room if cursor <= limit.
+  int64_t size;            ///< Bytes of a record.
+  int64_t emitted;         ///< Records appended, with those in no bucket.
+  int64_t kept;            ///< Placed ports: records that have a bucket.
+  uint32_t *bucket_cursor; ///< Where the next bucket of a record is noted.
+  uint32_t *bucket_end;    ///< There is room if bucket_cursor < bucket_end.
+  int64_t last_bucket;     ///< Of the latest record; -1 = it has none yet.
+  int64_t buckets; ///< Buckets of the consumer; 0 = a port without places.
   // What follows belongs to the runtime.
   uint32_t *ordinal_cursor;
   uint32_t *ordinal_end;
@@ -154,8 +155,8 @@ typedef struct pikoir_port {
 enum pikoir_port_flags {
   PIKOIR_PORT_ORDINALS = 1, ///< Each kept record notes its ordinal.
   PIKOIR_PORT_COUNTS = 2,   ///< Each position notes its number of records.
-  PIKOIR_PORT_SOURCE = 4,   ///< Cells of a source's primitives, no records.
-  PIKOIR_PORT_DEFERRED = 8, ///< Between pikoir_defer_begin and _end.
+  PIKOIR_PORT_SOURCE = 4,   ///< Buckets of a source's primitives, no records.
+  PIKOIR_PORT_DEFERRED = 8, ///< Between pikoir_reorder_begin and _end.
   PIKOIR_PORT_LOCAL = 16,   ///< Its edge is local.
   PIKOIR_PORT_SERIAL = 32   ///< Of a writer: its launch is serial.
 };
@@ -172,8 +173,8 @@ typedef struct pikoir_writer {
   int64_t mappings;
 } pikoir_writer;
 
-/// The first entry that a record notes in its list of cells has this bit.
-#define PIKOIR_FIRST_CELL 0x80000000u
+/// The first entry that a record notes in its list of buckets has this bit.
+#define PIKOIR_FIRST_BUCKET 0x80000000u
 
 /// How many records are written at once, at most.
 #define PIKOIR_MOST_RESERVED 64
@@ -187,14 +188,15 @@ PIKORT_API pikoir_writer *pikoir_open(pikort_pipeline *p, int32_t stage,
 /// have not begun; -1 if there is none.
 PIKORT_API int64_t pikoir_next_unit(const pikoir_input *input);
 /// Room for the next record of a port, never null. The caller writes all
-/// leaves; padding is zero. A record that is placed in no cell is dropped: its
-/// room is the next record's.
+/// leaves; padding is zero. A record that is placed in no bucket is dropped:
+/// its room is the next record's.
 PIKORT_API uint8_t *pikoir_append(pikoir_writer *writer, int32_t port);
-/// Puts the port's latest record in a cell of the consumer. A cell named twice
-/// counts once. A cell outside the grid is a PIKORT_BIN_OUTSIDE error.
-PIKORT_API void pikoir_place(pikoir_writer *writer, int32_t port, int64_t cell);
+/// Puts the port's latest record in a bucket of the consumer. A bucket named
+/// twice counts once. A bucket outside the grid is a PIKORT_BIN_OUTSIDE error.
+PIKORT_API void pikoir_place(pikoir_writer *writer, int32_t port,
+                             int64_t bucket);
 /// Sees to it that so many more records of a port, at most
-/// PIKOIR_MOST_RESERVED, have room one behind the other from its cursor on. The
+/// PIKOIR_MOST_RESERVED, have room one after the other from its cursor on. The
 /// writer has no flags.
 PIKORT_API void pikoir_reserve(pikoir_writer *writer, int32_t port,
                                int64_t count);
@@ -205,21 +207,21 @@ PIKORT_API void pikoir_close(pikoir_writer *writer);
 PIKORT_API int32_t pikoir_end(pikort_pipeline *p, int32_t stage);
 
 /// What a port of a local edge has emitted since the last time, as one unit of
-/// one cell; of a LIST stage, one unit of all calls. Valid until end_local,
+/// one bucket; of a LIST stage, one unit of all calls. Valid until end_local,
 /// which forgets it: no append to the port lies between. Never null.
 PIKORT_API const pikoir_input *pikoir_begin_local(pikoir_writer *writer,
                                                   int32_t port);
 PIKORT_API void pikoir_end_local(pikoir_writer *writer, int32_t port);
 
-/// Emissions of iterations that meet barriers. From defer_begin to defer_end,
-/// appends and places belong to the iteration that was named last, in [0,
-/// iterations), and an iteration may be named many times, in any order. At the
-/// end all are emitted in order of iteration, and within one in the order of
-/// the calls. They do not nest.
-PIKORT_API void pikoir_defer_begin(pikoir_writer *writer, int64_t iterations);
-PIKORT_API void pikoir_defer_iteration(pikoir_writer *writer,
-                                       int64_t iteration);
-PIKORT_API void pikoir_defer_end(pikoir_writer *writer);
+/// Emissions of iterations that meet barriers. From reorder_begin to
+/// reorder_end, appends and places belong to the iteration that was named last,
+/// in [0, iterations), and an iteration may be named many times, in any order.
+/// At the end all are emitted in order of iteration, and within one in the
+/// order of the calls. They do not nest.
+PIKORT_API void pikoir_reorder_begin(pikoir_writer *writer, int64_t iterations);
+PIKORT_API void pikoir_reorder_iteration(pikoir_writer *writer,
+                                         int64_t iteration);
+PIKORT_API void pikoir_reorder_end(pikoir_writer *writer);
 
 /// `bytes` of memory for a call of Process, aligned to 64 bytes and not
 /// initialised; never null for 0 bytes. Null if memory is refused, or if the
@@ -272,7 +274,7 @@ PIKORT_API const pikoir_input *pikoir_begin_source(pikort_pipeline *p,
                                                    int32_t source);
 PIKORT_API pikoir_writer *pikoir_open_source(pikort_pipeline *p, int32_t source,
                                              int64_t unit);
-PIKORT_API void pikoir_place_source(pikoir_writer *writer, int64_t cell);
+PIKORT_API void pikoir_place_source(pikoir_writer *writer, int64_t bucket);
 PIKORT_API int32_t pikoir_end_source(pikort_pipeline *p, int32_t source);
 
 /// Schedules that depend on the bin: before any kernel, begin_schedule, which
@@ -336,7 +338,7 @@ PIKORT_API void pikoir_fail_barrier(pikort_pipeline *p, int32_t stage,
 // docs/Diagnostics.md. A place is a constant "file:line", or null.
 
 /// Primitives of `record` are the host's `host` with the number of their
-/// lineage, 64 bits, at an offset behind it. The host binds `host`.
+/// lineage, 64 bits, at an offset after it. The host binds `host`.
 PIKORT_API void pikoir_declare_checked_record(pikort_pipeline *p,
                                               int32_t record, int32_t host,
                                               int64_t lineage_offset);
@@ -374,7 +376,7 @@ PIKORT_API void pikoir_check_access(pikort_pipeline *p, int32_t state,
 enum pikoir_check_loop {
   PIKOIR_CHECK_BEGIN = 0,
   PIKOIR_CHECK_ITERATION = 1, ///< Its accesses follow.
-  PIKOIR_CHECK_BARRIER = 2,   ///< The same, behind one more barrier.
+  PIKOIR_CHECK_BARRIER = 2,   ///< The same, after one more barrier.
   PIKOIR_CHECK_END = 3
 };
 PIKORT_API void pikoir_check_loop(pikort_pipeline *p, int32_t event,
@@ -436,44 +438,44 @@ static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
       (out->flags & ~(PIKOIR_PORT_LOCAL | PIKOIR_PORT_COUNTS)) != 0)
     return pikoir_append(writer, port);
   ++out->emitted;
-  if (out->cells != 0) // kept by its first place
-    out->last_cell = -1;
+  if (out->buckets != 0) // kept by its first place
+    out->last_bucket = -1;
   else
     out->cursor = record + out->size;
   return record;
 }
 
 static inline void pikoir_place_inline(pikoir_writer *writer, int32_t port,
-                                       int64_t cell) {
+                                       int64_t bucket) {
   pikoir_port *out = &writer->ports[port];
-  if (cell <= out->last_cell || cell >= out->cells ||
-      out->cell_cursor == out->cell_end ||
+  if (bucket <= out->last_bucket || bucket >= out->buckets ||
+      out->bucket_cursor == out->bucket_end ||
       (out->flags & ~(PIKOIR_PORT_COUNTS | PIKOIR_PORT_SOURCE)) != 0) {
-    pikoir_place(writer, port, cell);
+    pikoir_place(writer, port, bucket);
     return;
   }
-  uint32_t entry = (uint32_t)cell;
-  if (out->last_cell < 0) {
-    entry |= PIKOIR_FIRST_CELL;
+  uint32_t entry = (uint32_t)bucket;
+  if (out->last_bucket < 0) {
+    entry |= PIKOIR_FIRST_BUCKET;
     out->cursor += out->size;
-    out->run = out->cell_cursor;
+    out->run = out->bucket_cursor;
     ++out->kept;
   }
-  *out->cell_cursor++ = entry;
-  out->last_cell = cell;
+  *out->bucket_cursor++ = entry;
+  out->last_bucket = bucket;
 }
 
 /// pikoir_place for a port whose edge is local.
 static inline void pikoir_place_local_inline(pikoir_writer *writer,
-                                             int32_t port, int64_t cell) {
+                                             int32_t port, int64_t bucket) {
   pikoir_port *out = &writer->ports[port];
-  if ((uint64_t)cell >= (uint64_t)out->cells || out->last_cell != -1 ||
+  if ((uint64_t)bucket >= (uint64_t)out->buckets || out->last_bucket != -1 ||
       (out->flags & ~PIKOIR_PORT_LOCAL) != 0) {
-    pikoir_place(writer, port, cell);
+    pikoir_place(writer, port, bucket);
     return;
   }
   out->cursor += out->size;
-  out->last_cell = cell;
+  out->last_bucket = bucket;
 }
 
 static inline void pikoir_next_inline(pikoir_writer *writer) {

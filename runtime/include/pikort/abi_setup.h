@@ -41,7 +41,7 @@ PIKORT_API void pikoir_setup_version(pikort_pipeline *p,
 enum pikoir_stage_flags {
   PIKOIR_COLLECTS = 1,  ///< Emissions start a new lineage (bin, ordinal).
   PIKOIR_SPLIT = 2,     ///< A bin may be cut into chunks of primitives.
-  PIKOIR_PLACED = 4,    ///< AssignBin places; else all are in bin 0, cell 0.
+  PIKOIR_PLACED = 4,    ///< AssignBin places; else all are in bin 0, bucket 0.
   PIKOIR_UNORDERED = 8, ///< The order of its input and output is free.
   PIKOIR_LIST = 16,     ///< Process takes a list; it collects.
   PIKOIR_ORDERED = 32,  ///< The order of its calls in a bin can be seen, as by
@@ -59,9 +59,9 @@ enum pikoir_schedule {
 
 PIKORT_API void pikoir_declare_pipeline(pikort_pipeline *p, const char *name,
                                         int32_t rank);
-/// The most cells that the domain may have in a dimension, if they are fewer
+/// The most buckets that the domain may have in a dimension, if they are fewer
 /// than PIKORT_MAX_EXTENT.
-PIKORT_API void pikoir_declare_max_extent(pikort_pipeline *p, int64_t cells);
+PIKORT_API void pikoir_declare_max_extent(pikort_pipeline *p, int64_t buckets);
 PIKORT_API void pikoir_declare_record(pikort_pipeline *p, int32_t id,
                                       const char *name, int64_t size,
                                       int64_t align);
@@ -77,7 +77,7 @@ PIKORT_API void pikoir_declare_state(pikort_pipeline *p, int32_t id,
                                      int32_t record, int32_t rank,
                                      int32_t per_source, const void *clear);
 /// The image is the kernels' own: the host does not see it. Its number is
-/// behind those of all state that the host sees.
+/// after those of all state that the host sees.
 PIKORT_API void pikoir_declare_internal(pikort_pipeline *p, int32_t id);
 /// Kernels write the buffer: what the host binds to it must be apart from other
 /// buffers and sources, as generated code takes for granted.
@@ -85,12 +85,12 @@ PIKORT_API void pikoir_declare_written(pikort_pipeline *p, int32_t id);
 /// No kernel uses the buffer: the host need not bind it.
 PIKORT_API void pikoir_declare_unused(pikort_pipeline *p, int32_t id);
 /// `bin_size` has one entry for each dimension, 0 = the whole domain.
-/// `cell_size` is the side of owner tiles in a bin, 0 = the bin is one cell.
+/// `tile_size` is the side of owner tiles in a bin, 0 = the bin is one bucket.
 PIKORT_API void pikoir_declare_stage(pikort_pipeline *p, int32_t id,
                                      const char *name, int32_t record,
                                      const int64_t *bin_size, int32_t schedule,
                                      int64_t tile_split, int32_t flags,
-                                     int64_t cell_size);
+                                     int64_t tile_size);
 PIKORT_API void pikoir_declare_source(pikort_pipeline *p, int32_t index,
                                       int32_t stage);
 PIKORT_API void pikoir_declare_edge(pikort_pipeline *p, int32_t producer,
@@ -127,7 +127,7 @@ PIKORT_API void pikoir_declare_join(pikort_pipeline *p, int32_t producer,
 /// them as well. Without this declaration: 0.
 PIKORT_API void pikoir_declare_keys(pikort_pipeline *p, int32_t stage,
                                     int32_t keys);
-/// The number, behind those of sources, of the lineage that a stage begins
+/// The number, after those of sources, of the lineage that a stage begins
 /// which collects. Stages of one cycle share it. Without this declaration: 0.
 PIKORT_API void pikoir_declare_root(pikort_pipeline *p, int32_t stage,
                                     int32_t root);
@@ -164,7 +164,7 @@ PIKORT_API void pikoir_declare_private(pikort_pipeline *p, int32_t stage,
                                        const void *identity, int32_t run_shift,
                                        int32_t often, pikoir_combine combine);
 /// Selects, for pixels [begin, end), between two threads' images, of which each
-/// array has the first pixels, and behind them those of the units (int32_t, -1
+/// array has the first pixels, and after them those of the units (int32_t, -1
 /// = none) that pixels are of: what comes first by the key, and of equal keys
 /// by the unit, or last, is in `to` then.
 typedef void (*pikoir_select)(uint8_t *const *to, uint8_t *const *from,

@@ -10,7 +10,7 @@
  *   pikoir_log_close(p, log);
  *
  * Memory is taken by adding to `cursor`, in pieces that begin with their
- * length. Threads put entries into pieces of their own, their outboxes; now and
+ * length. Threads put entries into pieces of their own, their buffers; now and
  * then a block says in a directory what its threads have there, in their order.
  * So what a unit has emitted is in the order of its directories, and of the
  * entries in each. Where there is no room, a thread writes to `spare`, and the
@@ -27,7 +27,7 @@ extern "C" {
 
 enum {
   PIKOIR_ENTRY_RECORD = 0, ///< Of port `number`: the record.
-  PIKOIR_ENTRY_CELL = 1,   ///< Of port `number`: int64_t cell.
+  PIKOIR_ENTRY_BUCKET = 1, ///< Of port `number`: int64_t bucket.
   PIKOIR_ENTRY_NEXT = 2,
   PIKOIR_ENTRY_ERROR = 3, ///< At place `number`: int64_t bin, a, b, position.
   PIKOIR_ENTRY_LINK = 4, ///< It goes on at the address in `number` and `stage`.
@@ -49,7 +49,7 @@ typedef struct pikoir_piece {
   int64_t bytes; ///< With the header.
   int64_t kind;
   int64_t unit, spans;
-  int64_t next; ///< The unit's directory behind this one: its address, or 0.
+  int64_t next; ///< The unit's directory after this one: its address, or 0.
   int64_t reserved[3];
 } pikoir_piece;
 
@@ -65,21 +65,21 @@ typedef struct pikoir_unit_log {
   int64_t rest;
 } pikoir_unit_log;
 
-/// What a thread has of an outbox, in words of eight bytes.
+/// What a thread has of an append buffer, in words of eight bytes.
 enum {
-  PIKOIR_OUTBOX_BEGIN = 0, ///< Addresses; where it has none yet, 0.
-  PIKOIR_OUTBOX_CURSOR = 1,
-  PIKOIR_OUTBOX_LIMIT = 2, ///< Behind it there is room for a link.
-  PIKOIR_OUTBOX_BYTES = 3, ///< Half of what it takes next, if that is 512.
-  PIKOIR_OUTBOX_LAST = 4,  ///< The last record.
-  PIKOIR_OUTBOX_KEPT = 5,  ///< How many were placed.
+  PIKOIR_APPEND_BEGIN = 0, ///< Addresses; where it has none yet, 0.
+  PIKOIR_APPEND_CURSOR = 1,
+  PIKOIR_APPEND_LIMIT = 2, ///< After it there is room for a link.
+  PIKOIR_APPEND_BYTES = 3, ///< Half of what it takes next, if that is 512.
+  PIKOIR_APPEND_LAST = 4,  ///< The last record.
+  PIKOIR_APPEND_KEPT = 5,  ///< How many were placed.
   /// Of the primitive that errors are about, where a thread does not take them
-  /// in order; in the first outbox.
-  PIKOIR_OUTBOX_POSITION = 6,
-  PIKOIR_OUTBOX_WORDS = 7
+  /// in order; in the first append buffer.
+  PIKOIR_APPEND_POSITION = 6,
+  PIKOIR_APPEND_WORDS = 7
 };
 /// Words of a block that a flush needs: one for each warp, and one.
-#define PIKOIR_FLUSH_CELLS 33
+#define PIKOIR_FLUSH_WORDS 33
 
 /// What a block has of a local edge.
 enum {
@@ -125,7 +125,7 @@ PIKORT_API void pikoir_log_place(pikort_pipeline *p, pikoir_log *log,
 PIKORT_API void pikoir_log_close(pikort_pipeline *p, pikoir_log *log);
 
 /// Runs `thread(arguments)` for all threads of all blocks, on a device that the
-/// calling thread plays. Not 0: `seed` permutes the blocks.
+/// calling thread emulates. Not 0: `seed` permutes the blocks.
 PIKORT_API void pikoir_grid_launch(pikort_pipeline *p,
                                    void (*thread)(const void *), int64_t blocks,
                                    int64_t threads, const void *arguments,
@@ -136,7 +136,7 @@ PIKORT_API void pikoir_grid_launch(pikort_pipeline *p,
 typedef struct pikoir_cuda_image {
   int32_t chip;     ///< Of a cubin, 10 * major + minor; of PTX, 0.
   int32_t is_exact; ///< A cubin for devices of just this number.
-  const void *data; ///< Null behind the last one.
+  const void *data; ///< Null after the last one.
 } pikoir_cuda_image;
 
 /// In a program's setup: its grids run on a CUDA device, which loads one of
@@ -144,13 +144,13 @@ typedef struct pikoir_cuda_image {
 /// as the program.
 PIKORT_API void pikoir_cuda_module(pikort_pipeline *p,
                                    const pikoir_cuda_image *images);
-/// Behind it, for messages: the stage of a kernel, and where that stands, as
+/// After it, for messages: the stage of a kernel, and where that stands, as
 /// "file:line" or "".
 PIKORT_API void pikoir_cuda_kernel(pikort_pipeline *p, const char *kernel,
                                    const char *stage, const char *place);
 /// A grid of a kernel, for a device that runs the program by itself.
 typedef struct pikoir_cuda_grid {
-  const char *kernel; ///< Null behind the last one of a kernel of the pipeline.
+  const char *kernel; ///< Null after the last one of a kernel of the pipeline.
   int64_t threads;    ///< Of a block.
   int64_t count;      ///< Of arguments, words of eight bytes.
   /// Writes them, for an input and a log that only the device reads.
@@ -170,7 +170,7 @@ enum {
   PIKOIR_STEP_STRIPS = 4, ///< What group `number` of strips repeats.
   PIKOIR_STEP_END_STRIPS = 5,
   /// What loop `number` repeats while primitives are on their way: the kernels
-  /// of its stages. Behind it, before them: where primitives come in, if that
+  /// of its stages. After it, before them: where primitives come in, if that
   /// is at several stages or one at a time, and where they leave.
   PIKOIR_STEP_WAVES = 6,
   PIKOIR_STEP_ENTRY = 7, ///< At stage `number`, which is number `member`.

@@ -29,7 +29,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 12u
+#define PIKORT_ABI_VERSION 13u
 /// The most cells that a domain may have in a dimension, so that sums of
 /// coordinates and small numbers do not wrap around.
 #define PIKORT_MAX_EXTENT 1073741824
@@ -65,7 +65,7 @@ enum pikort_status {
   PIKORT_WRONG_PROCESSOR = 9,  ///< No code that this processor can run.
   PIKORT_NO_DEVICE = 10,       ///< No device of the kind that it is for.
   PIKORT_DEVICE_FAILED = 11,   ///< The device, or its driver, failed.
-  PIKORT_REPEATED = 12,        ///< A run was, behind what followed it in its
+  PIKORT_REPEATED = 12,        ///< A run was, after what followed it in its
                                ///< stream: see pikort_run_async.
   PIKORT_NOT_WRITTEN = 13,     ///< A file could not be written.
   PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
@@ -183,7 +183,6 @@ PIKORT_API int32_t pikort_bind_source(pikort_pipeline *pipeline, int32_t source,
                                       const void *data, int64_t count,
                                       int64_t record_size);
 
-/// The memory of a piece of state.
 /// The same in memory of the device that the pipeline is on: an address as
 /// cuMemAlloc or cudaMalloc gives it. Kernels read and write it in place;
 /// nothing is copied where no run has to be taken step by step by the host. The
@@ -241,7 +240,7 @@ typedef struct pikort_device_view {
 
 /// Where an image or a buffer lies on the device that the pipeline is on, for
 /// kernels and copies of the host's. Nothing is copied, and nothing waited for:
-/// what is there is what the run has left for those behind it in its stream.
+/// what is there is what the run has left for those after it in its stream.
 /// The address stays until a run with another domain, or with another number of
 /// primitives where a source sizes the buffer, until it is bound or allocated
 /// anew, and until the pipeline goes; the contents until the next run. Images
@@ -273,7 +272,7 @@ PIKORT_API int32_t pikort_run(pikort_pipeline *pipeline);
 /// refused.
 ///
 /// Until pikort_wait the run owns what is bound: memory of the host may be
-/// neither changed nor freed, and what the run writes to it is there behind
+/// neither changed nor freed, and what the run writes to it is there after
 /// pikort_wait. Meanwhile the host may set constants and options and bind for
 /// the next run. Calls that need the end of the run wait for it: those that
 /// run, pikort_get_view, pikort_read, pikort_allocate_buffer. How it has ended
@@ -344,7 +343,7 @@ typedef struct pikort_stage_info {
   const char *name;
   int64_t bin_size[4]; ///< Cells, 0 = the whole domain; unused = 0.
   int64_t tile_split;
-  int64_t cell_size;
+  int64_t tile_size;
   int32_t record;   ///< Of the primitives that come in.
   int32_t schedule; ///< As in pikoir_declare_stage.
   int32_t flags;    ///< As in pikoir_declare_stage.
@@ -420,7 +419,7 @@ typedef struct pikort_unit_run {
   double begin, end;          ///< Milliseconds since the run began.
 } pikort_unit_run;
 
-/// Has `report` called behind each unit, from the thread that ran it, several
+/// Has `report` called after each unit, from the thread that ran it, several
 /// at the same time; null = no more. Launches of a cycle that are too small for
 /// threads have no units. The run is slower for it. Times are exact from the
 /// second run on.
@@ -474,7 +473,7 @@ typedef struct pikort_stage_stats {
 enum pikort_counter_kind {
   PIKORT_CALLS = 0,      ///< Of Process.
   PIKORT_ITERATIONS = 1, ///< Of a parallel loop.
-  PIKORT_TURNS = 2,      ///< Of any other loop.
+  PIKORT_TRIPS = 2,      ///< Iterations of any other loop.
   PIKORT_EMISSIONS = 3,  ///< Out of a port.
   PIKORT_READS = 4,      ///< Of fields of a piece of state.
   PIKORT_STORES = 5,     ///< The same, written.

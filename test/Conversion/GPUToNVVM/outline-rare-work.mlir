@@ -1,8 +1,7 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work))' --split-input-file | FileCheck %s
 // RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-outline-rare-work,convert-scf-to-cf-in-reverse,convert-gpu-to-exact-nvvm))' --split-input-file | FileCheck %s --check-prefix=LLVM
 
-// What the thread's number gives is computed again; parameters go by the block's
-// memory; an array of the loop's own moves; of another one a copy comes back.
+// What the thread's number gives is computed again; parameters go by shared memory; an array of the loop's own moves; of another one a copy comes back.
 // CHECK-LABEL: gpu.module @kernels
 // CHECK:         func.func @k_rare(%[[BEGIN:.*]]: index, %[[END:.*]]: index, %[[SUM:.*]]: f32, %[[WORDS:.*]]: memref<2xi64, #gpu.address_space<workgroup>>, %[[A:.*]]: f32, %[[B:.*]]: f32) -> (f32, f32)
 // CHECK-SAME:        noinline

@@ -1,7 +1,7 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-reload-inputs))' | FileCheck %s
 
 // A member is loaded for each unit where the loop over units has another one in it;
-// one that only the innermost loop needs, in front of that; and one that is not
+// one that only the innermost loop needs, before that; and one that is not
 // marked stays.
 // CHECK-LABEL: gpu.func @k
 // CHECK-SAME:    (%[[INPUT:.*]]: !llvm.ptr, %[[OUT:.*]]: !llvm.ptr

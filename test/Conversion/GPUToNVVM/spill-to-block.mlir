@@ -1,7 +1,6 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(gpu.module(piko-spill-to-block{max-registers=4}))' --split-input-file | FileCheck %s
 
-// What only covered pixels need, and what only rows step by, waits in the block's
-// memory; what each pixel needs, and constants, do not. A cast is made again from
+// What only covered pixels need, and what only rows step by, waits in shared memory; what each pixel needs, and constants, do not. A cast is made again from
 // what was spilled.
 // CHECK-LABEL: gpu.func @rows
 // CHECK-SAME:    %[[EDGES:[a-z0-9]+]] : memref<64xi64, {{[^)]*}}%[[AREAS:[a-z0-9]+]] : memref<64xf32, {{[^)]*}}%[[STEPS:[a-z0-9]+]] : memref<64xi64, {{[^)]*}}%[[NUMBERS:[a-z0-9]+]] : memref<64xi32,

@@ -10,7 +10,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Emits
 // CHECK:         gpu.launch
 // CHECK-SAME:      threads(%[[T:[a-z0-9]+]],
-// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.bucket_range
 // CHECK:           %[[COUNT:.*]] = arith.subi %[[END]], %[[BEGIN]]
 // CHECK:           %[[MANY:.*]] = arith.cmpi sge, %[[COUNT]], %c5
 // CHECK:           scf.if %[[MANY]] {

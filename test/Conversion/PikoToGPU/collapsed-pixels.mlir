@@ -44,7 +44,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:             piko.gpu.leave_rest %[[LOG:.*]][%{{.*}}] from %{{.*}}
 // CHECK-NOT:     piko.rare
 // CHECK:         gpu.launch {{.*}} function(@P_kernel_draw_rest)
-// The counters of loops over units and cells are in the block's memory, and what
+// The counters of loops over units and cells are in shared memory, and what
 // groups need of the cell, which each use loads.
 // CHECK:           scf.while
 // CHECK:             piko.gpu.take_units %[[LOG]][%{{.*}}] for rest

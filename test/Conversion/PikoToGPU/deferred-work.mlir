@@ -5,7 +5,7 @@ piko.record @Box {"x" : i32 at 0, "y" : i32 at 4, "width" : i32 at 8,
                   "height" : i32 at 12} size 16 align 4
 piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 
-// Boxes with a width wait in the block's memory: four numbers each, and which
+// Boxes with a width wait in shared memory: four numbers each, and which
 // primitive it is.
 // CHECK-LABEL: piko.kernel @kernel_draw
 // CHECK:         gpu.launch {{.*}} threads(%[[T:[a-z0-9]+]],

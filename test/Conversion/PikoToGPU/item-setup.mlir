@@ -6,7 +6,7 @@ piko.record @Plane {"x" : i32 at 0, "y" : i32 at 4, "toX" : i32 at 8,
 piko.record @Pixel {"n" : i64 at 0} size 8 align 8
 
 // A bin has too many pixels for masks, so threads take one primitive after the
-// other. What a pixel needs of the setup is loaded in front of the loops over
+// other. What a pixel needs of the setup is loaded before the loops over
 // pixels; what a row needs, in each row, if it would take two registers.
 // CHECK-LABEL: piko.kernel @kernel_draw
 // CHECK:         gpu.launch {{.*}} %[[LONG:[a-z0-9]+]] : memref<128xi64, #gpu.address_space<workgroup>>, %[[SHORT:[a-z0-9]+]] : memref<256xi32, #gpu.address_space<workgroup>>

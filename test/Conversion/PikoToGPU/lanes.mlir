@@ -14,7 +14,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-LABEL: piko.kernel @kernel_iterations
 // CHECK:         gpu.launch blocks({{.*}} threads(%[[T:[a-z0-9]+]],
 // CHECK:           scf.for %{{.*}} to %{{.*}} step %c1 {
-// CHECK:             piko.storage.cell_range
+// CHECK:             piko.storage.bucket_range
 // CHECK:             scf.for %{{.*}} to %{{.*}} step %c1 {
 // CHECK:               %[[HAS:.*]] = arith.cmpi slt, %[[T]], %c8
 // CHECK-NEXT:          scf.if %[[HAS]]

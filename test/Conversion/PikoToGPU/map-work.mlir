@@ -3,7 +3,7 @@
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
-// Threads share the primitives of a bin; behind each round the block takes what
+// Threads share the primitives of a bin; after each round the block takes what
 // they have emitted.
 // CHECK-LABEL: piko.kernel @kernel_copy
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
@@ -11,8 +11,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-SAME:        workgroup(%[[CELLS:[a-z0-9]*]] : memref<33xi64, #gpu.address_space<workgroup>>
 // CHECK:           %[[BOX:.*]] = memref.alloca() : memref<7xi64>
 // CHECK-COUNT-6:   memref.store %c0_i64, %[[BOX]]
-// CHECK:           piko.gpu.outboxes %[[LOG]] in %[[BOX]]
-// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// CHECK:           piko.gpu.append_buffers %[[LOG]] in %[[BOX]]
+// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.bucket_range
 // CHECK:           gpu.barrier
 // CHECK:           scf.for %[[ROUND:.*]] = %[[BEGIN]] to %[[END]] step %c32 {
 // CHECK:             %[[I:.*]] = arith.addi %[[ROUND]], %[[T]]
@@ -53,14 +53,14 @@ piko.pipeline @Emits rank 1 {
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
-// What the first thread finds goes through the block's memory to the loop that
+// What the first thread finds goes through shared memory to the loop that
 // all share, and their array is there, too.
 // CHECK-LABEL: piko.kernel @kernel_sum
 // CHECK:         gpu.launch
 // CHECK-SAME:        threads(%[[T:[a-z0-9]+]],
 // CHECK-SAME:        workgroup({{.*}}, %[[CELL:.*]] : memref<1xi32, #gpu.address_space<workgroup>>, %[[ARRAY:.*]] : memref<16xi32, #gpu.address_space<workgroup>>
 // CHECK:           %[[IS_FIRST:.*]] = arith.cmpi eq, %[[T]], %c0
-// CHECK:           piko.storage.unit_cells
+// CHECK:           piko.storage.unit_buckets
 // CHECK:           gpu.barrier
 // CHECK:           scf.if %[[IS_FIRST]] {
 // CHECK:             %[[OLD:.*]] = scf.if %{{.*}} -> (i32) {
@@ -208,14 +208,14 @@ piko.pipeline @Pixels rank 2 {
 
 // -----
 
-// What primitives do in order, and emit in, is the first thread's: 32 of them, behind
+// What primitives do in order, and emit in, is the first thread's: 32 of them, after
 // which the block takes what they have emitted, so that no join has to follow all of it
 // by one thread.
 // CHECK-LABEL: piko.kernel @kernel_test
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
 // CHECK:         gpu.launch blocks({{.*}}threads(%[[T:[a-z0-9]+]],
 // CHECK:           %[[FIRST:.*]] = arith.cmpi eq, %[[T]], %c0 : index
-// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// CHECK:           %[[BEGIN:.*]], %[[END:.*]] = piko.storage.bucket_range
 // CHECK-NEXT:      scf.for %[[ROUND:.*]] = %[[BEGIN]] to %[[END]] step %c32 {
 // CHECK-NEXT:        %[[NEXT:.*]] = arith.addi %[[ROUND]], %c32
 // CHECK-NEXT:        %[[STOP:.*]] = arith.minsi %[[NEXT]], %[[END]]

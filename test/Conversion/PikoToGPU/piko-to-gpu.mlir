@@ -20,8 +20,8 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // Threads are 4 wide and 2 high.
 // CHECK:             %[[TX:.*]] = arith.remui %[[T]], %c4
 // CHECK:             %[[ROW:.*]] = arith.divui %[[T]], %c4
-// CHECK:             piko.storage.unit_cells %[[BINS]][
-// CHECK:             piko.storage.cell_range %[[BINS]][%{{.*}},
+// CHECK:             piko.storage.unit_buckets %[[BINS]][
+// CHECK:             piko.storage.bucket_range %[[BINS]][%{{.*}},
 // Each thread does the setup of one of 8 primitives, and notes which one errors
 // are about: fields, and what the pixels need of "to" and "x".
 // CHECK:             scf.for %[[BASE:.*]] = %{{.*}} to %{{.*}} step %c8
@@ -47,7 +47,7 @@ piko.record @Pixel {"n" : i32 at 0} size 4 align 4
 // CHECK:                 %[[K8:.*]] = arith.addi %[[K]], %c8
 // CHECK:                 memref.load %[[SETUP]][%[[K8]]]
 // CHECK:                 memref.load %[[SETUP]][%[[K]]]
-// The row is behind a test of whose it is; the loop along it has a step of 4.
+// The row is under a test of whose it is; the loop along it has a step of 4.
 // CHECK:                 arith.shrui %{{.*}}, %c2_i32
 // CHECK:                 %[[REST:.*]] = arith.andi %{{.*}}, %c1_i32
 // CHECK:                 %[[MINE:.*]] = arith.cmpi eq, %[[REST]], %{{.*}} : i32

@@ -1,7 +1,7 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-program,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
 // RUN: not piko-opt %s --piko-to-units 2>&1 | FileCheck %s --check-prefix=CPU
 
-// A kernel that precedes another one is a launch of that one's, in front of its
+// A kernel that precedes another one is a launch of that one's, before its
 // own: both take the same bins. Its blocks take units in turn, as the counter of
 // units is the other launch's.
 // CHECK-LABEL: piko.pipeline @Before

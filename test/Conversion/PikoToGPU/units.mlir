@@ -40,13 +40,13 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:                 scf.if %[[HAS]]
 // CHECK:                   %[[FIRST:.*]] = piko.gpu.take_units %[[LOG]][%{{.*}}]{{$}}
 // CHECK:                   arith.cmpi ult, %[[FIRST]], %[[COUNT]]
-// All threads are told behind a barrier, and come to another one before the next.
+// All threads are told after a barrier, and come to another one before the next.
 // CHECK:               gpu.barrier
 // CHECK-NEXT:          %[[MINE:.*]] = memref.load %[[UNIT]][%c0]
 // CHECK-NEXT:          %[[GOES_ON:.*]] = arith.cmpi ne, %[[MINE]], %c-1_i32
 // CHECK-NEXT:          scf.condition(%[[GOES_ON]])
 // CHECK:             } do {
-// CHECK:               piko.storage.unit_cells
+// CHECK:               piko.storage.unit_buckets
 // CHECK:               piko.gpu.flush
 // CHECK:               piko.gpu.flush
 // CHECK-NEXT:          gpu.barrier

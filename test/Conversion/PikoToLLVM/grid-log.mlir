@@ -1,5 +1,5 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=64},convert-piko-to-gpu,piko-form-program,convert-piko-to-scf),convert-piko-to-llvm,canonicalize,cse)' | FileCheck %s
-// What a thread emits goes to its outbox, and where that is full to another piece
+// What a thread emits goes to its append buffer, and where that is full to another piece
 // of memory; a flush says in a directory what the threads of a block have.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
@@ -41,7 +41,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:               llvm.atomicrmw add %{{.*}}, %[[BYTES]] monotonic
 // CHECK:             memref.store %[[FIRST]], %[[BOX]][%c0]
 // CHECK:             llvm.store %[[FIRST]], %{{.*}} : i64
-// The record stands behind the header.
+// The record stands after the header.
 // CHECK:           %[[AT:.*]] = arith.addi %[[ENTRY]], %c16_i64
 // CHECK:           %[[GLOBAL:.*]] = llvm.inttoptr %[[AT]] : i64 to !llvm.ptr<1>
 // CHECK:           %[[RECORD:.*]] = llvm.addrspacecast %[[GLOBAL]] : !llvm.ptr<1> to !llvm.ptr
@@ -64,7 +64,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // One reservation for the block: a header, and 16 bytes for each of these threads.
 // CHECK:             %[[SPANS:.*]] = arith.muli %[[SUMS]]#1, %c16_i64
 // CHECK:             llvm.atomicrmw add
-// Behind the unit's last directory, or as its first.
+// After the unit's last directory, or as its first.
 // CHECK:               %[[UNITS:.*]] = llvm.getelementptr inbounds %[[LOG]][24]
 // CHECK:               llvm.load %[[UNITS]]
 // CHECK:               arith.muli %{{.*}}, %c24_i64

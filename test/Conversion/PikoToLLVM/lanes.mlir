@@ -4,7 +4,7 @@ piko.record @F {"lo" : i32 at 0, "hi" : i32 at 4, "w" : f32 at 8} size 12 align 
 piko.record @D {"z" : f32 at 0} size 4 align 4
 piko.record @C {"r" : f32 at 0, "g" : f32 at 4} size 40 align 4
 
-// Pixels that lie one behind the other are loaded and stored as a vector; with
+// Pixels that lie one after the other are loaded and stored as a vector; with
 // many words between them, they are scattered. An element of a buffer is found
 // for each lane.
 // CHECK-LABEL: func.func private @P.kernel_a

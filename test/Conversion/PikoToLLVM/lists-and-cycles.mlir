@@ -27,9 +27,9 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         llvm.icmp "ne" %[[MEMORY]]
 // CHECK:         llvm.insertvalue %[[MEMORY]]
 // CHECK:         builtin.unrealized_conversion_cast {{.*}} to memref<?xi8>
-// CHECK:         llvm.call @pikoir_defer_begin(%[[W]], %{{.*}})
-// CHECK:         llvm.call @pikoir_defer_iteration(%[[W]], %{{.*}})
-// CHECK:         llvm.call @pikoir_defer_end(%[[W]])
+// CHECK:         llvm.call @pikoir_reorder_begin(%[[W]], %{{.*}})
+// CHECK:         llvm.call @pikoir_reorder_iteration(%[[W]], %{{.*}})
+// CHECK:         llvm.call @pikoir_reorder_end(%[[W]])
 // CHECK:         llvm.call @pikoir_scratch_release(%[[W]], %[[MARK]])
 // A primitive is a pointer, also where it is chosen.
 // CHECK:         scf.if %{{.*}} -> (!llvm.ptr)
@@ -43,7 +43,7 @@ piko.record @F {"x" : i32 at 0, "v" : f32 at 4} size 8 align 4
 // CHECK:         llvm.call @pikoir_fail_barrier(%{{.*}}, %c0_i32, %{{.*}}, %{{.*}}, %{{.*}})
 
 // LIST, UNORDERED and COLLECTS; then COLLECTS alone. The stage that collects
-// begins a lineage, behind those of two sources, and what is merged has keys.
+// begins a lineage, after those of two sources, and what is merged has keys.
 // CHECK-LABEL: func.func @P.setup
 // CHECK:         llvm.call @pikoir_declare_stage({{.*}}, %c25_i32, %{{.*}})
 // CHECK:         llvm.call @pikoir_declare_schedule(%{{.*}}, %c0_i32, %c4_i64, %c1_i32)
@@ -109,9 +109,9 @@ piko.pipeline @P rank 1 {
     %bytes, %granted = piko.cpu.scratch %w[%hi]
     %none = arith.constant 0 : i8
     memref.store %none, %bytes[%u] : memref<?xi8>
-    piko.cpu.defer_begin %w[%hi]
-    piko.cpu.defer_iteration %w[%lo]
-    piko.cpu.defer_end %w
+    piko.cpu.reorder_begin %w[%hi]
+    piko.cpu.reorder_iteration %w[%lo]
+    piko.cpu.reorder_end %w
     piko.cpu.scratch_release %w[%mark]
     %p = scf.if %granted -> !piko.prim<@F> {
       %item = piko.storage.item %bins[%b] : !piko.bins<@F> -> !piko.prim<@F>

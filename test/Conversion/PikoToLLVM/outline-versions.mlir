@@ -3,7 +3,7 @@
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // The versions of a loop over primitives are functions, where the scalar one is one
-// of two. What one takes from in front of the choice it gets as arguments, but for
+// of two. What one takes from before the choice it gets as arguments, but for
 // constants and arrays of its own.
 // CHECK:       func.func private @P.k.version0(%[[INNER:[a-z0-9]+]]: i1, %{{[a-z0-9]+}}: !llvm.ptr, %{{[a-z0-9]+}}: index) attributes {passthrough = ["noinline"]} {
 // CHECK-NOT:     memref.alloca

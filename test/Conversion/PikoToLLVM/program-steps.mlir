@@ -137,8 +137,8 @@ piko.pipeline @Entries rank 1 {
 
 piko.record @Ray {"x" : i32 at 0, "left" : i32 at 4} size 8 align 4
 
-// What runs between the turns of the stage that collects stands in front of the
-// rounds, and again behind its kernel.
+// What runs between the turns of the stage that collects stands before the
+// rounds, and again after its kernel.
 // CHECK-LABEL: @Rounds.setup
 // CHECK-SAME:    #piko.step<waves 0>, #piko.step<exit 1 exit 0>,
 // CHECK-SAME:      #piko.step<stage 0 by @Rounds.kernel_trace>,

@@ -5,7 +5,7 @@ piko.record @F {"lo" : i32 at 0, "hi" : i32 at 4, "w" : f32 at 8} size 12 align 
 piko.record @C {"r" : f32 at 0, "g" : f32 at 4, "b" : f32 at 8, "z" : f32 at 12} size 16 align 4
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 
-// Pixels of four words that lie one behind the other: four vectors, each with those
+// Pixels of four words that lie one after the other: four vectors, each with those
 // of four lanes, as far as these are in the mask. Pairs of words are brought
 // together first, then one word of each. Three words are written; the fourth one is
 // in no mask.

@@ -4,7 +4,7 @@
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.record @N {"least" : i64 at 0, "bits" : i32 at 8} size 16 align 8
 
-// Numbers one behind the other are loaded and stored as vectors, those of larger
+// Numbers one after the other are loaded and stored as vectors, those of larger
 // records gathered and scattered. Notes are from the first lane in the mask to the
 // last one; without a copy each lane changes the state, locked.
 // CHECK-LABEL: func.func private @P.kernel_a(

@@ -10,7 +10,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         llvm.call @pikoir_declare_strips(%{{.*}}, %c0_i32, %c0_i32, %c256_i64, %{{.*}}, %c2_i32)
 
 // The kernels run for each strip, and once more where the runtime takes a strip
-// back; a status ends the run only behind the loop.
+// back; a status ends the run only after the loop.
 // CHECK-LABEL: func.func @P.run(%{{.*}}: !llvm.ptr)
 // CHECK:         %[[BEFORE:.*]] = call @P.kernel_before
 // CHECK:         cf.cond_br %{{.*}}, ^[[EXIT:bb[0-9]+]](%[[BEFORE]] : i32), ^[[NEXT:bb[0-9]+]]

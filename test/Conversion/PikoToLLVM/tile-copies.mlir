@@ -40,7 +40,7 @@ piko.pipeline @P rank 2 {
     %c3 = arith.constant 3 : index
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %w = piko.cpu.open_writer %bins[%c0] : !piko.bins<@F>
-    %begin, %end = piko.storage.cell_range %bins[%c0, %c3] : !piko.bins<@F>
+    %begin, %end = piko.storage.bucket_range %bins[%c0, %c3] : !piko.bins<@F>
     %n = arith.subi %end, %begin : index
     %copied = piko.cpu.open_tile @seen[%c3] of %w for %n
     %x = arith.index_cast %begin : index to i32

@@ -8,7 +8,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[W:.*]] = llvm.call @pikoir_open
 
 // Room for a record: cursor, limit, flags; then emitted, and for a port without
-// places the cursor behind the record.
+// places the cursor after the record.
 // CHECK:         %[[PORTS:.*]] = llvm.getelementptr inbounds %[[W]][24]
 // CHECK:         %[[PORT:.*]] = llvm.load %[[PORTS]]
 // CHECK:         %[[CURSOR:.*]] = llvm.load %[[PORT]] {{.*}}: !llvm.ptr -> !llvm.ptr
@@ -109,7 +109,7 @@ piko.pipeline @Q rank 1 {
   }
 }
 
-// Behind a local edge nothing is noted: a record that comes to any one cell of
+// After a local edge nothing is noted: a record that comes to any one cell of
 // the consumer needs no call.
 // CHECK-LABEL: func.func private @R.kernel_a
 // CHECK:         %[[W:.*]] = llvm.call @pikoir_open(

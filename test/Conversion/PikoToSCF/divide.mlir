@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// An integer division goes behind a test of whether it has a result; otherwise
+// An integer division goes under a test of whether it has a result; otherwise
 // the stage is reported, and 0 taken.
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-form-units,convert-piko-to-scf),canonicalize,cse)' %s | FileCheck %s
 // RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu %s | FileCheck %s --check-prefix=LLVM
@@ -22,7 +22,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK-NEXT: %[[Q:.*]] = arith.divsi %[[X]], %[[Y]]
 // CHECK-NEXT: scf.yield %[[Q]]
 // CHECK-NEXT: } else {
-// CHECK-NEXT: %[[BIN:.*]] = piko.storage.cell_bin
+// CHECK-NEXT: %[[BIN:.*]] = piko.storage.bucket_bin
 // CHECK-NEXT: piko.fail_divide @a in %[[BIN]]
 // CHECK-NEXT: scf.yield %[[ZERO]]
 // An unsigned quotient always fits.

@@ -21,14 +21,14 @@ piko.record @u32 {"value" : i32 at 0} size 4 align 4
 // CHECK:           scf.yield %[[CLOSER]]
 // CHECK:         } else {
 // The bin of the call is found where it is to be told alone.
-// CHECK-NEXT:      %[[BIN:.*]] = piko.storage.cell_bin
+// CHECK-NEXT:      %[[BIN:.*]] = piko.storage.bucket_bin
 // CHECK-NEXT:      piko.fail @a in %[[BIN]] outside bin of @image(%[[XI]])
 // CHECK:         %[[N:.*]] = piko.extent @counts[0]
 // CHECK:         %[[OK:.*]] = arith.cmpi ult, %[[XI]], %[[N]]
 // CHECK:         scf.if %[[OK]] {
 // CHECK:           piko.atomic add checked @counts
 // CHECK:         } else {
-// CHECK-NEXT:      %[[BIN2:.*]] = piko.storage.cell_bin
+// CHECK-NEXT:      %[[BIN2:.*]] = piko.storage.bucket_bin
 // CHECK-NEXT:      piko.fail @a in %[[BIN2]] outside @counts(%[[XI]])
 piko.pipeline @P rank 1 {
   piko.image @image : @Pixel rank 1

@@ -13,7 +13,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK-DAG:     %[[ONE:.*]] = arith.constant 1.000000e+00 : f32
 // CHECK-DAG:     %[[THREE:.*]] = arith.constant 3 : i32
 // CHECK:         %[[BINS:.*]] = piko.storage.open_bins @a
-// CHECK:         %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// CHECK:         %[[BEGIN:.*]], %[[END:.*]] = piko.storage.bucket_range
 // CHECK:         %[[FILLED:.*]] = arith.cmpi ne, %[[BEGIN]], %[[END]]
 // CHECK:         scf.if %[[FILLED]] {
 // CHECK-NOT:       memref.alloca
@@ -84,7 +84,7 @@ piko.pipeline @P rank 2 {
 // with what is in the image.
 // COPY-LABEL:  piko.pipeline @Copies
 // COPY:          %[[W:.*]] = piko.cpu.open_writer
-// COPY:          %[[BEGIN:.*]], %[[END:.*]] = piko.storage.cell_range
+// COPY:          %[[BEGIN:.*]], %[[END:.*]] = piko.storage.bucket_range
 // COPY:          scf.if
 // COPY:            %[[COUNT:.*]] = arith.subi %[[END]], %[[BEGIN]]
 // COPY-NOT:        piko.cpu.open_tile @image

@@ -15,8 +15,8 @@ piko.pipeline @P rank 1 {
 piko.record @F {"z" : f32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.buffer @b : @F
-  // expected-error@+1 {{expected no piece of state with 'turns'}}
-  piko.counter 0 turns of "s" to @b
+  // expected-error@+1 {{expected no piece of state with 'trips'}}
+  piko.counter 0 trips of "s" to @b
   piko.source @s
   piko.stage @s bins [0] threads 1 : @F -> [] {}
 }
@@ -36,7 +36,7 @@ piko.pipeline @P rank 1 {
 piko.record @F {"z" : f32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   // expected-error@+1 {{expected it inside of an earlier counter, but got 0}}
-  piko.counter 0 turns of "s" inside 0
+  piko.counter 0 trips of "s" inside 0
   piko.source @s
   piko.stage @s bins [0] threads 1 : @F -> [] {}
 }

@@ -25,7 +25,7 @@ piko.pipeline @P rank 2 {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
     }
-    // expected-error@+1 {{expected to be the first of its kernel, or behind a local barrier that names @a}}
+    // expected-error@+1 {{expected to be the first of its kernel, or after a local barrier that names @a}}
     piko.process of @a {
     ^bb0(%f: !piko.prim<@F>):
       piko.return

@@ -47,7 +47,7 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [8] threads 1 : @F -> [@F] {}
   piko.stage @b bins [8] threads 1 : list @F -> [] {}
   piko.kernel @k {
-    // expected-error @below {{expected the process phase of @a in front of it}}
+    // expected-error @below {{expected the process phase of @a before it}}
     piko.local_barrier @a[0] -> @b
     piko.process of @b {
     ^bb0(%l: !piko.list<@F>):
@@ -69,7 +69,7 @@ piko.pipeline @P rank 1 {
     ^bb0(%f: !piko.prim<@F>):
       piko.return
     }
-    // expected-error @below {{expected to stand in front of a process phase}}
+    // expected-error @below {{expected to stand before a process phase}}
     piko.local_barrier @a[0] -> @b
   }
 }

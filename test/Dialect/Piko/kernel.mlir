@@ -65,9 +65,9 @@ piko.pipeline @Resolved rank 2 {
   piko.kernel @kernel_a {
     // CHECK-NEXT: %[[BINS:.*]] = piko.storage.open_bins @a : !piko.bins<@F>
     // CHECK-NEXT: %[[UNIT:.*]] = piko.storage.unit_count
-    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.storage.unit_cells %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.storage.cell_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
-    // CHECK-NEXT: %[[BIN:.*]] = piko.storage.cell_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[FIRST:.*]], %{{.*}} = piko.storage.unit_buckets %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[AT:.*]], %{{.*}} = piko.storage.bucket_range %[[BINS]][%[[UNIT]], %[[FIRST]]] : !piko.bins<@F>
+    // CHECK-NEXT: %[[BIN:.*]] = piko.storage.bucket_bin %[[BINS]][%[[FIRST]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[PRIM:.*]] = piko.storage.item %[[BINS]][%[[AT]]] : !piko.bins<@F> -> !piko.prim<@F>
     // CHECK-NEXT: piko.cpu.prefetch_item %[[BINS]][%[[AT]]] : !piko.bins<@F>
     // CHECK-NEXT: %[[X:.*]] = piko.get %[[PRIM]] "x"
@@ -84,9 +84,9 @@ piko.pipeline @Resolved rank 2 {
     // CHECK-NEXT: piko.cpu.private_images @shown by [0] ["slt"] last carries [] keeps [array<i64: 0>] unit @shown.unit of %[[W]] often
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %u = piko.storage.unit_count %bins : !piko.bins<@F>
-    %c0, %c1 = piko.storage.unit_cells %bins[%u] : !piko.bins<@F>
-    %i0, %i1 = piko.storage.cell_range %bins[%u, %c0] : !piko.bins<@F>
-    %b = piko.storage.cell_bin %bins[%c0] : !piko.bins<@F>
+    %c0, %c1 = piko.storage.unit_buckets %bins[%u] : !piko.bins<@F>
+    %i0, %i1 = piko.storage.bucket_range %bins[%u, %c0] : !piko.bins<@F>
+    %b = piko.storage.bucket_bin %bins[%c0] : !piko.bins<@F>
     %p = piko.storage.item %bins[%i0] : !piko.bins<@F> -> !piko.prim<@F>
     piko.cpu.prefetch_item %bins[%i0] : !piko.bins<@F>
     %x = piko.get %p "x" : !piko.prim<@F> -> i32
@@ -104,7 +104,7 @@ piko.pipeline @Resolved rank 2 {
   }
 }
 
-// A stage behind a local barrier, and how it works on the storage of one bin.
+// A stage after a local barrier, and how it works on the storage of one bin.
 // CHECK-LABEL: piko.pipeline @Local
 piko.pipeline @Local rank 1 {
   piko.source @a
@@ -134,11 +134,11 @@ piko.pipeline @Local rank 1 {
     %v = piko.cpu.open_writer %bins[%u] of @b : !piko.bins<@F>
     // CHECK-NEXT: piko.storage.local_bin @b from %{{.*}}[0] writer %[[V]] {
     // CHECK-NEXT: ^bb0(%[[LOCAL:.*]]: !piko.bins<@F>):
-    // CHECK-NEXT: piko.storage.unit_cells %[[LOCAL]]
+    // CHECK-NEXT: piko.storage.unit_buckets %[[LOCAL]]
     // CHECK-NEXT: piko.storage.next %[[V]]
     piko.storage.local_bin @b from %w[0] writer %v {
     ^bb0(%local: !piko.bins<@F>):
-      %c0, %c1 = piko.storage.unit_cells %local[%u] : !piko.bins<@F>
+      %c0, %c1 = piko.storage.unit_buckets %local[%u] : !piko.bins<@F>
       piko.storage.next %v
     }
   }
@@ -179,15 +179,15 @@ piko.pipeline @Lists rank 1 {
     %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
     // CHECK: %[[MARK:.*]] = piko.cpu.scratch_mark %[[W:.*]]
     // CHECK-NEXT: %{{.*}}, %{{.*}} = piko.cpu.scratch %[[W]][%[[U]]]
-    // CHECK-NEXT: piko.cpu.defer_begin %[[W]][%[[U]]]
-    // CHECK-NEXT: piko.cpu.defer_iteration %[[W]][%[[U]]]
-    // CHECK-NEXT: piko.cpu.defer_end %[[W]]
+    // CHECK-NEXT: piko.cpu.reorder_begin %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.cpu.reorder_iteration %[[W]][%[[U]]]
+    // CHECK-NEXT: piko.cpu.reorder_end %[[W]]
     // CHECK-NEXT: piko.cpu.scratch_release %[[W]][%[[MARK]]]
     %mark = piko.cpu.scratch_mark %w
     %bytes, %granted = piko.cpu.scratch %w[%u]
-    piko.cpu.defer_begin %w[%u]
-    piko.cpu.defer_iteration %w[%u]
-    piko.cpu.defer_end %w
+    piko.cpu.reorder_begin %w[%u]
+    piko.cpu.reorder_iteration %w[%u]
+    piko.cpu.reorder_end %w
     piko.cpu.scratch_release %w[%mark]
     // CHECK-NEXT: piko.fail_list @a at %[[LO]] of %[[HI]]
     // CHECK-NEXT: piko.fail_barrier @a iteration %[[U]]

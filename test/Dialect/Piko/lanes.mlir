@@ -34,7 +34,7 @@ piko.pipeline @P rank 2 {
     // CHECK: %[[OF:.*]] = piko.cpu.elements @depth[%{{.*}}, %{{.*}} : vector<16xindex>, index] : vector<16xindex>
     %of = piko.cpu.elements @depth[%at, %c2 : vector<16xindex>, index] : vector<16xindex>
     // CHECK: piko.cpu.elements consecutive @depth[%{{.*}}, %{{.*}} : index, index] : vector<16xindex>
-    %behind = piko.cpu.elements consecutive @depth[%c2, %c2 : index, index] : vector<16xindex>
+    %after = piko.cpu.elements consecutive @depth[%c2, %c2 : index, index] : vector<16xindex>
     // CHECK: piko.cpu.set_fields(%[[A]]) to %[[OF]] ["z"] of @depth mask %{{.*}} : vector<16xindex>, vector<16xi1>, vector<16xf32>
     piko.cpu.set_fields(%a) to %of ["z"] of @depth mask %mask : vector<16xindex>, vector<16xi1>, vector<16xf32>
     %bins = piko.storage.open_bins @a : !piko.bins<@F>

@@ -255,7 +255,7 @@ piko.pipeline @P rank 1 {
       piko.items of @a {
       ^bb0(%f: !piko.prim<@F>):
       }
-      // expected-error@+1 {{expected work that takes the same behind it}}
+      // expected-error@+1 {{expected work that takes the same after it}}
       piko.items of @b from @a[0] attributes {piko.again} {
       ^bb0(%f: !piko.prim<@F>):
       }

@@ -2,7 +2,7 @@
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
-// What lanes are given stands behind what work takes.
+// What lanes are given stands after what work takes.
 // CHECK-LABEL: piko.pipeline @Lanes
 piko.pipeline @Lanes rank 1 {
   piko.source @a

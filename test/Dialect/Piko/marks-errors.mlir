@@ -61,9 +61,9 @@ func.func @pixels() {
 
 func.func @turns(%end: index) {
   %c1 = arith.constant 1 : index
-  // expected-error@+1 {{expected 'piko.turns' to be a 64-bit float, but got 8 : i64}}
+  // expected-error@+1 {{expected 'piko.iterations' to be a 64-bit float, but got 8 : i64}}
   scf.for %i = %c1 to %end step %c1 {
-  } {piko.turns = 8}
+  } {piko.iterations = 8}
   return
 }
 

@@ -1,7 +1,7 @@
 // RUN: piko-opt %s --split-input-file --verify-diagnostics
 
 // Phases, stages, kernels and programs have names of their own: what one says of
-// a value is no reference to one of another that stands behind it.
+// a value is no reference to one of another that stands after it.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {

@@ -6,7 +6,7 @@
 Every identifier of Piko's headers, but for the names of the language, is the
 name of one of the pipeline's own functions. `members` calls them in phases and
 in the constructor of a pipeline, where a member of a base would hide them;
-`namespace` calls them behind `using namespace piko`. Names of the language that
+`namespace` calls them after `using namespace piko`. Names of the language that
 its description does not have are an error.
 """
 import pathlib

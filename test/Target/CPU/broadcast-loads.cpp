@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 // What all lanes share is broadcast from memory where it is used: numbers that
-// were loaded in front of a branch, or on both of its sides, or together, by the
+// were loaded before a branch, or on both of its sides, or together, by the
 // SLP vectorizer.
 // RUN: pikoc %s -o - --emit=assembly --cpu x86-64-v4 | FileCheck %s
 // RUN: pikoc %s -o - --emit=assembly --cpu x86-64-v3 | FileCheck %s --check-prefix=AVX2

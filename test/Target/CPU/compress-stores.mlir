@@ -29,9 +29,9 @@ piko.pipeline @P rank 1 {
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@B>
       %copy = piko.cpu.private_copy max_unsigned @sums "n" of %writer often
-      %begin, %end = piko.storage.unit_cells %bins[%u] : !piko.bins<@B>
+      %begin, %end = piko.storage.unit_buckets %bins[%u] : !piko.bins<@B>
       scf.for %cell = %begin to %end step %step {
-        %lo, %hi = piko.storage.cell_range %bins[%u, %cell] : !piko.bins<@B>
+        %lo, %hi = piko.storage.bucket_range %bins[%u, %cell] : !piko.bins<@B>
         scf.for %i = %lo to %hi step %step {
           %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>
           %w = piko.get %b "w" : !piko.prim<@B> -> i32

@@ -1,7 +1,7 @@
 // Bytes that lanes read in different places, and that piko-pair-gathers has not
 // loaded one by one: the words that they lie in, shifted,
 // where there are gathers; loads of one byte each where there are none, or where
-// a sanitizer would tell of what lies behind a buffer.
+// a sanitizer would tell of what lies after a buffer.
 // REQUIRES: x86_64
 // RUN: pikoc %s --emit=assembly --without=pair-gathers --cpu x86-64-v4 | FileCheck %s --check-prefix=WIDE
 // RUN: pikoc %s --emit=assembly --without=pair-gathers --cpu x86-64-v3 | FileCheck %s --check-prefix=HALF

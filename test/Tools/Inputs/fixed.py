@@ -10,8 +10,8 @@ same = runs["general"]["image_hash"] == runs["fixed"]["image_hash"]
 print("the same picture" if same else "another picture")
 for name, run in runs.items():
     calls = {stage["name"]: stage["calls"] for stage in run["work"]["stages"]}
-    turns = sum(loop["turns"] for loop in run["work"]["loops"]
+    iterations = sum(loop["iterations"] for loop in run["work"]["loops"]
                 if loop["stage"] == "shade")
     kernels = " ".join(kernel["name"] for kernel in run["work"]["kernels"])
-    print(f"{name}: shade {turns // calls['shade']} lights a call, "
+    print(f"{name}: shade {iterations // calls['shade']} lights a call, "
           f"kernels {kernels}")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """host-macros.py MACROS COMPILER FLAG... -- HEADER...
 
-Compiles each header behind the macros of a host, and fails if one does not, or if
+Compiles each header after the macros of a host, and fails if one does not, or if
 a macro is another one afterwards."""
 import re
 import subprocess

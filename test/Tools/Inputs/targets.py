@@ -44,7 +44,7 @@ def read_commands(text):
 
 
 def get_values(words, option):
-    """The words behind an option, up to the next one."""
+    """The words after an option, up to the next one."""
     values, found = [], False
     for word in words:
         name, _, value = word.partition("=")

@@ -229,7 +229,7 @@ piko.pipeline @Roots rank 1 {
 }
 
 // A product that both sides of a condition yield is contracted with what is added
-// behind it; one that only one side yields is none.
+// after it; one that only one side yields is none.
 // CHECK-LABEL: piko.pipeline @Sides
 // CHECK:         %[[SIDES:.*]]:4 = scf.if
 // CHECK:           scf.yield %{{.*}}, %{{.*}}, %[[A:.*]], %[[B:.*]] : f32, f32, f32, f32

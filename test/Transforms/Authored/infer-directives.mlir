@@ -210,7 +210,7 @@ piko.pipeline @Function rank 2 {
 
 // Wrapping around is no way to stay above the lower bound, a bound of another
 // dimension is none, and what holds only where it is emitted says nothing about
-// earlier turns of a loop.
+// earlier iterations of a loop.
 // CHECK-LABEL: piko.pipeline @Wrong
 piko.pipeline @Wrong rank 1 {
   piko.source @a

@@ -1,6 +1,6 @@
 // RUN: piko-opt --piko-normalize-loops --cse %s | FileCheck %s
 
-// `x <= last` of branches: the work moves behind the condition.
+// `x <= last` of branches: the work moves under the condition.
 // CHECK-LABEL: func.func @closed
 func.func @closed(%lo: i32, %last: i32) {
   %one = arith.constant 1 : i32
@@ -117,7 +117,7 @@ func.func @after(%lo: i32) {
 func.func private @work(i32)
 func.func private @test(i32) -> i1
 
-// An element of an array is read only behind the condition on its index, unless
+// An element of an array is read only under the condition on its index, unless
 // the index is constant.
 piko.record @F {"i" : i32 at 0, "w" : i32[4 : 4] at 4} size 20 align 4
 piko.record @N {"v" : i32 at 0} size 4 align 4

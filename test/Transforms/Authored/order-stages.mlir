@@ -78,7 +78,7 @@ piko.pipeline @Branches rank 2 {
   }
 }
 
-// A stage that waits starts a branch, which comes behind the one it waits for
+// A stage that waits starts a branch, which comes after the one it waits for
 // although it is farther from the drain.
 // CHECK-LABEL: piko.pipeline @Waits
 // CHECK:         piko.stage @shadow

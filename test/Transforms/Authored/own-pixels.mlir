@@ -3,7 +3,7 @@
 piko.record @F {"x" : f32 at 0, "y" : i32 at 4, "z" : f32 at 8} size 12 align 4
 piko.record @Depth {"z" : f32 at 0} size 4 align 4
 
-// What the pixel is computed from is copied in front of the assignment, and no
+// What the pixel is computed from is copied before the assignment, and no
 // more than that: the depth stays out.
 // CHECK-LABEL: piko.pipeline @Whole
 // CHECK:         piko.stage @test bins [0, 0] threads 64 tile 16

@@ -5,7 +5,7 @@
 piko.record @F {"z" : f32 at 0} size 4 align 4
 piko.record @G {"z" : f32 at 0} size 4 align 4
 
-// A cycle that nothing enters goes as a whole; the port behind it moves up.
+// A cycle that nothing enters goes as a whole; the port after it moves up.
 // CHECK-LABEL: piko.pipeline @Cycle
 // CHECK-NOT: piko.edge @shade[0] -> @trace
 // CHECK: piko.edge @shade[0] -> @end

@@ -122,7 +122,7 @@ piko.pipeline @P rank 1 {
     }
   }
 
-  // Of a nest the range of each index is computed in front of it: here of
+  // Of a nest the range of each index is computed before it: here of
   // b[n * min(j + k, x)], where products have four corners; sums that it has
   // found to fit do not wrap around.
   // CHECK:      piko.kernel @kernel_ranges

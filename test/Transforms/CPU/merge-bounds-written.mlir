@@ -2,8 +2,8 @@
 
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 
-// Fields that nothing in between writes are read behind one test, and those that
-// nothing in between reads are written behind one.
+// Fields that nothing in between writes are read under one test, and those that
+// nothing in between reads are written after one.
 // CHECK-LABEL: piko.kernel @merged
 // CHECK:         %[[XY:.*]]:2 = scf.if %[[INSIDE:.*]] -> (f32, f32) {
 // CHECK-NEXT:      piko.load checked @out[%[[I:.*]] : i32] "x" : f32
@@ -53,8 +53,8 @@ piko.pipeline @P rank 1 {
     }
   }
 
-  // A read behind a write of the field, perhaps of another element, stays there,
-  // and the write in front of it; so does a write that is followed by another
+  // A read after a write of the field, perhaps of another element, stays there,
+  // and the write before it; so does a write that is followed by another
   // test, whose error might come first.
   // CHECK-LABEL: piko.kernel @left
   // CHECK:         scf.if %[[INSIDE:.*]] {

@@ -7,7 +7,7 @@ piko.record @Triangle {"a" : i32 at 0, "b" : i32 at 4} size 8 align 4
 piko.record @Corner {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8} size 12 align 4
 piko.record @Color {"v" : f32 at 0} size 4 align 4
 
-// A pixel reads a key, by it a triangle, and by that two corners. In front of a
+// A pixel reads a key, by it a triangle, and by that two corners. Before a
 // row stand loops that ask for the keys of the third row from there, for the
 // triangles of the second one, and for the corners of the next, each if there is
 // such a row, and of keys that differ from those of the row before.

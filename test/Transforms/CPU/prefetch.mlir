@@ -30,7 +30,7 @@ piko.pipeline @P rank 1 {
   // Those of a bin are asked for, and what they refer to: once for each element,
   // not where an index is computed, nor on the long side of a condition.
   // CHECK:       piko.kernel @kernel_bins
-  // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.storage.cell_range
+  // CHECK:         %[[LO:.*]], %[[HI:.*]] = piko.storage.bucket_range
   // CHECK:         %[[LAST:.*]] = arith.subi %[[HI]], %c1
   // CHECK:         scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
   // CHECK:           %[[FAR:.*]] = arith.addi %[[I]], %c16
@@ -185,7 +185,7 @@ piko.record @Large {"x" : i32 at 0, "y" : f64 at 8, "z" : f64 at 16} size 24 ali
 // from other bins.
 // CHECK-LABEL: piko.pipeline @Scattered
 // CHECK:       piko.kernel @kernel_large
-// CHECK:         piko.storage.cell_range
+// CHECK:         piko.storage.bucket_range
 // CHECK-NEXT:    scf.for %[[I:.*]] =
 // CHECK:           %[[FAR:.*]] = arith.addi %[[I]], %c16
 // CHECK:           piko.cpu.prefetch_item %{{.*}}[%[[FAR]]] : !piko.bins<@Large>

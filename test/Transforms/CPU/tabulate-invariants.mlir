@@ -11,7 +11,7 @@ piko.pipeline @Lights rank 2 {
 
   // The root is the same for all pixels. Only the last one of what follows from a
   // light alone has a table, which is filled once for all loops, as far as the
-  // lights go; with more lights each turn computes it.
+  // lights go; with more lights each iteration computes it.
   // CHECK-LABEL: piko.kernel @k
   // CHECK:         scf.forall
   // CHECK:           %[[N:.*]] = piko.extent @lights[0]
@@ -65,7 +65,7 @@ piko.pipeline @Lights rank 2 {
   }
 
   // There is no table of what takes no root, of state that the kernel changes, of
-  // another element than the turn's, of a number that differs between pixels, nor
+  // another element than the iteration's, of a number that differs between pixels, nor
   // of a loop that is in no other.
   // CHECK-LABEL: piko.kernel @others
   // CHECK-NOT:     memref.alloca

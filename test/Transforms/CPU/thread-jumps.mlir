@@ -42,8 +42,8 @@ piko.pipeline @P rank 1 {
     }
   }
 
-  // Little work, work that the other side or the code behind needs, and a
-  // condition behind an effect stay where they are.
+  // Little work, work that the other side or the code after needs, and a
+  // condition after an effect stay where they are.
   // CHECK-LABEL: piko.kernel @kept
   // CHECK:         %[[LITTLE:.*]] = arith.andi
   // CHECK:         scf.if %[[LITTLE]] {

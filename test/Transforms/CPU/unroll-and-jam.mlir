@@ -10,9 +10,9 @@ piko.pipeline @P rank 1 {
   piko.source @s
   piko.stage @s bins [0] threads 1 : @N -> [] {}
 
-  // Four turns share the inner loop, which loads and stores an element once. The
+  // Four iterations share the inner loop, which loads and stores an element once. The
   // loop goes on where the last strip of four ended.
-  // REMARK: [[@LINE+27]]:5: remark: 4 turns of this loop share those of the loop inside of it (unroll-and-jam)
+  // REMARK: [[@LINE+27]]:5: remark: 4 iterations of this loop share those of the loop inside of it (unroll-and-jam)
   // CHECK-LABEL: piko.kernel @product
   // CHECK-DAG:     %[[N:.*]] = piko.extent @a[0]
   // CHECK-DAG:     %[[M:.*]] = piko.extent @b[0]
@@ -53,7 +53,7 @@ piko.pipeline @P rank 1 {
 
   // A field that is read, and the other one of the same element, which is
   // stored in between, stay where they are.
-  // REMARK: [[@LINE+10]]:5: remark: 4 turns of this loop share those of the loop inside of it
+  // REMARK: [[@LINE+10]]:5: remark: 4 iterations of this loop share those of the loop inside of it
   // CHECK-LABEL: piko.kernel @fields
   // CHECK:         scf.for %{{.*}} step %c4 {
   // CHECK:           scf.for
@@ -75,7 +75,7 @@ piko.pipeline @P rank 1 {
   }
 
   // The inner loop's end is computed in the outer one, from what does not change.
-  // REMARK: [[@LINE+11]]:5: remark: 4 turns of this loop share those of the loop inside of it
+  // REMARK: [[@LINE+11]]:5: remark: 4 iterations of this loop share those of the loop inside of it
   // CHECK-LABEL: piko.kernel @end
   // CHECK:         scf.for %{{.*}} step %c4 {
   // CHECK:           %[[M:.*]] = arith.addi %{{.*}}, %c7
@@ -97,9 +97,9 @@ piko.pipeline @P rank 1 {
     }
   }
 
-  // The turn before changes another element.
-  // REMARK: [[@LINE+8]]:5: remark: turns of this loop do not share those of the loop inside of it (unroll-and-jam)
-  // REMARK: [[@LINE+11]]:14: note: it may use an element here that another turn of the inner loop changes
+  // The iteration before changes another element.
+  // REMARK: [[@LINE+8]]:5: remark: iterations of this loop do not share those of the loop inside of it (unroll-and-jam)
+  // REMARK: [[@LINE+11]]:14: note: it may use an element here that another iteration of the inner loop changes
   // CHECK-LABEL: piko.kernel @solves
   // CHECK-NOT:     step %c4
   piko.kernel @solves {
@@ -117,8 +117,8 @@ piko.pipeline @P rank 1 {
     }
   }
 
-  // What is read in front of the inner loop, that loop changes.
-  // REMARK: [[@LINE+6]]:5: remark: turns of this loop do not share
+  // What is read before the inner loop, that loop changes.
+  // REMARK: [[@LINE+6]]:5: remark: iterations of this loop do not share
   // REMARK: [[@LINE+6]]:12: note: it may use an element here
   piko.kernel @reads {
     %c0 = arith.constant 0 : index
@@ -135,8 +135,8 @@ piko.pipeline @P rank 1 {
   }
 
   // Nothing is said of loops that could gain nothing, or that may fail: elements
-  // of the outer turn's own, a length that differs, an index that is tested, and
-  // so few turns that LLVM unrolls them.
+  // of the outer iteration's own, a length that differs, an index that is tested, and
+  // so few iterations that LLVM unrolls them.
   // REMARK-NOT: remark
   // CHECK-LABEL: piko.kernel @others
   // CHECK-NOT:     step %c4{{ }}

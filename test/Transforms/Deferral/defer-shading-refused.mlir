@@ -292,7 +292,7 @@ piko.pipeline @P rank 1 {
 
 // -----
 
-// What is read is not painted for the last time.
+// What is read is not overwritten for the last time.
 
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4

@@ -1,7 +1,7 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-defer-shading))' --split-input-file %s 2>/dev/null | FileCheck %s
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-defer-shading))' --split-input-file --verify-diagnostics -o /dev/null %s
 
-// A loop moves behind the work. Two numbers are kept: the sum in front of the
+// A loop moves after the work. Two numbers are kept: the sum before the
 // loop is cheaper to keep than its parts, and the pixel is known.
 
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4, "b" : f32 at 8} size 12 align 4
@@ -81,7 +81,7 @@ piko.pipeline @P rank 1 {
 
 // -----
 
-// One update that tests and paints is two. What is painted with reads the depth
+// One update that tests and overwrites is two. What is overwritten with reads the depth
 // that won, not what the pixel was.
 
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4

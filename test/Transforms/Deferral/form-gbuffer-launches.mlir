@@ -1,10 +1,10 @@
 // RUN: piko-opt --piko-form-gbuffer --split-input-file --verify-diagnostics %s | FileCheck %s
 //
-// Kernels behind which nothing can be shaded.
+// Kernels after which nothing can be shaded.
 // CHECK-NOT: _pixels
 
-// Another kernel of the strips paints, too: what it has painted for one strip, the
-// next strip's primitives paint over.
+// Another kernel of the strips overwrites, too: what it has overwritten for one strip, the
+// next strip's primitives overwrite.
 
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4

@@ -2,7 +2,7 @@
 //
 // Names that are taken, and a number of a width that no field has.
 
-// CHECK: piko.record @piko.painted
+// CHECK: piko.record @piko.overwritten
 // CHECK: piko.record @piko.kept0 {"kept" : i8 at 0} size 1 align 1
 func.func private @piko.kept()
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4, "b" : f32 at 8} size 12 align 4

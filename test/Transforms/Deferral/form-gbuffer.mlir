@@ -2,10 +2,10 @@
 // RUN: piko-opt --piko-form-gbuffer --split-input-file %s 2>/dev/null | piko-opt --split-input-file | FileCheck %s
 // RUN: piko-opt --piko-form-gbuffer --split-input-file --verify-diagnostics -o /dev/null %s
 
-// A loop moves to a kernel of its own. The sum in front of it is kept, and that
+// A loop moves to a kernel of its own. The sum before it is kept, and that
 // the pixel has one; which pixel it is is known.
 
-// CHECK: piko.record @piko.painted {"painted" : i32 at 0} size 4 align 4
+// CHECK: piko.record @piko.overwritten {"overwritten" : i32 at 0} size 4 align 4
 // CHECK: piko.record @piko.kept {"kept" : f32 at 0} size 4 align 4
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4, "b" : f32 at 8} size 12 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
@@ -13,7 +13,7 @@ piko.pipeline @P rank 1 {
   piko.buffer @lights : @D
   piko.image @depth : @D rank 1
   piko.image @color : @D rank 1
-  // CHECK: piko.image @color.painted : @piko.painted rank 1 clear [0 : i32] internal
+  // CHECK: piko.image @color.overwritten : @piko.overwritten rank 1 clear [0 : i32] internal
   // CHECK: piko.image @color.kept : @piko.kept rank 1 internal
   piko.source @last
   piko.stage @last bins [0] threads 1 ordered : @F -> [] {}
@@ -46,7 +46,7 @@ piko.pipeline @P rank 1 {
         // CHECK: piko.update @color.kept[%[[AT:.*]] : i32] in
         // CHECK: piko.yield[%[[SUM]] : f32]
         // CHECK: } {piko.inside}
-        // CHECK: piko.update @color.painted[%[[AT]] : i32] in
+        // CHECK: piko.update @color.overwritten[%[[AT]] : i32] in
         scf.if %passed {
           %count = piko.extent @lights[0]
           %twice = arith.addf %both, %both : f32
@@ -60,7 +60,7 @@ piko.pipeline @P rank 1 {
             %after = arith.addf %before, %p : f32
             scf.yield %after : f32
           }
-          // expected-remark @below {{what is written to 'color' is computed once for each pixel, by a kernel behind that of stage 'last', from 8 bytes}}
+          // expected-remark @below {{what is written to 'color' is computed once for each pixel, by a kernel after that of stage 'last', from 8 bytes}}
           piko.update @color[%x : i32] in %bin {
           ^bb0(%old: f32):
             piko.yield [%sum : f32]
@@ -74,7 +74,7 @@ piko.pipeline @P rank 1 {
   // CHECK: piko.lists of @last_pixels
   // CHECK: piko.parallel_pixels
   // CHECK: ^bb0(%[[X:.*]]: i32):
-  // CHECK: %[[IS:.*]] = piko.load checked @color.painted[%[[X]] : i32] "painted" {piko.inside} : i32
+  // CHECK: %[[IS:.*]] = piko.load checked @color.overwritten[%[[X]] : i32] "overwritten" {piko.inside} : i32
   // CHECK: %[[TEST:.*]] = arith.cmpi ne, %[[IS]]
   // CHECK: scf.if %[[TEST]] {
   // CHECK: %[[KEPT:.*]] = piko.load checked @color.kept[%[[X]] : i32] "kept" {piko.inside} : f32
@@ -84,7 +84,7 @@ piko.pipeline @P rank 1 {
   // CHECK: piko.update @color[%[[X]] : i32] in %[[BIN]] {
   // CHECK: piko.yield[%[[RESULT]] : f32]
   // CHECK-LABEL: piko.program
-  // CHECK: piko.clear @color.painted
+  // CHECK: piko.clear @color.overwritten
   // CHECK: piko.launch @kernel_last(
   // CHECK-NEXT: %[[PIXELS:.*]] = piko.join @last_pixels() : () -> !piko.bins<@F>
   // CHECK-NEXT: piko.launch @kernel_last_pixels(%[[PIXELS]])
@@ -98,7 +98,7 @@ piko.pipeline @P rank 1 {
 
 // -----
 
-// Strips paint one after the other: the rest is done behind the last one. A truth
+// Strips overwrite one after the other: the rest is done after the last one. A truth
 // value that is kept takes a word.
 
 piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4
@@ -145,7 +145,7 @@ piko.pipeline @P rank 2 {
   // CHECK-LABEL: piko.kernel @kernel_last_pixels
   // CHECK: arith.trunci %{{.*}} : i32 to i1
   // CHECK-LABEL: piko.program
-  // CHECK: piko.clear @color.painted
+  // CHECK: piko.clear @color.overwritten
   // CHECK: piko.strips
   // CHECK: piko.launch @kernel_last(
   // CHECK: piko.leave

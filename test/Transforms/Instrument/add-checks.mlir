@@ -137,6 +137,30 @@ piko.pipeline @Unwritten rank 1 {
   }
 }
 
+// An assign phase has nothing that shows such a number: it is 0.
+// CHECK-LABEL: piko.pipeline @UnwrittenAssign
+// CHECK:         piko.assign
+// CHECK-NOT:       piko.undefined
+// CHECK:           %[[ZERO:.*]] = arith.constant 0 : i32
+// CHECK:           %[[BIN:.*]] = arith.index_cast %[[ZERO]]
+// CHECK:           piko.assign_to %[[BIN]]
+piko.pipeline @UnwrittenAssign rank 1 {
+  piko.source @start
+  piko.stage @start bins [8] threads 64 : @float -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@float>):
+      %number = piko.undefined : i32
+      %bin = arith.index_cast %number : i32 to index
+      piko.assign_to %bin
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@float>):
+      piko.return
+    }
+  }
+}
+
 // Indices of arrays are tested unless they are known to be inside, and what
 // loops go round is counted.
 // CHECK-LABEL: piko.pipeline @Bounds

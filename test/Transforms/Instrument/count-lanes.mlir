@@ -20,7 +20,7 @@ piko.pipeline @Lanes rank 1 {
   // CHECK: scf.if
   // CHECK: arith.mulf
   // CHECK: arith.mulf
-  // Behind the mask, two operations on as many lanes as it has.
+  // After the mask, two operations on as many lanes as it has.
   // CHECK: %[[BITS:.*]] = vector.bitcast %{{.*}} : vector<16xi1> to vector<1xi16>
   // CHECK: %[[ONES:.*]] = math.ctpop
   // CHECK: %[[COUNT:.*]] = arith.index_castui %[[ONES]]

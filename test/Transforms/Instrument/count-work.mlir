@@ -12,7 +12,7 @@ piko.record @V {"a" : f32 at 0, "b" : f32 at 4} size 8 align 4
 // CHECK-NEXT: piko.counter 0 calls of "first"
 // CHECK-NEXT: piko.counter 1 floats of "first"
 // CHECK-NEXT: piko.counter 2 integers of "first"
-// CHECK-NEXT: piko.counter 3 turns of "first" inside 0
+// CHECK-NEXT: piko.counter 3 trips of "first" inside 0
 // CHECK-NEXT: piko.counter 4 reads of "first" to @data
 // CHECK-NEXT: piko.counter 5 emissions of "first" port 0
 // CHECK-NEXT: piko.counter 6 calls of "second"
@@ -101,10 +101,10 @@ piko.pipeline @Count rank 1 {
   }
 }
 
-// The turns of a loop whose condition stands first are those that go on: of the
+// The iterations of a loop whose condition stands first are those that go on: of the
 // branch for its body, not of the test that fails.
 // CHECK-LABEL: piko.pipeline @While
-// CHECK: piko.counter 3 turns of "a" inside 0
+// CHECK: piko.counter 3 trips of "a" inside 0
 // CHECK: scf.while
 // CHECK: scf.if
 // CHECK-NEXT: %[[TURN:.*]] = arith.constant 1 : index

@@ -61,7 +61,7 @@ piko.pipeline @Stays rank 1 {
   }
 }
 
-// Behind @b the order of different bins shows: what comes to it needs that of
+// After @b the order of different bins shows: what comes to it needs that of
 // lineage, too. What @d gets may be of another bin.
 // CHECK-LABEL: piko.pipeline @Leaves
 // CHECK:         piko.join @a(concatenate

@@ -1,7 +1,7 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-program))' %s | FileCheck %s
 
 // Stages may stand in any order: what feeds a kernel, and what it waits for, runs
-// in front of it.
+// before it.
 // CHECK-LABEL: piko.pipeline @Order
 // CHECK:         piko.program
 // CHECK:           piko.launch @kernel_a

@@ -192,7 +192,7 @@ piko.pipeline @Commutes rank 1 {
   }
 }
 
-// A loop and a stage that collects are rounds: waves first, and then the turn of
+// A loop and a stage that collects are rounds: waves first, and then the iteration of
 // the list. What it emits goes around.
 // CHECK-LABEL: piko.pipeline @Rounds
 // CHECK:         %[[DONE:.*]] = piko.rounds(%{{.*}}) {

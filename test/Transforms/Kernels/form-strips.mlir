@@ -70,7 +70,7 @@ piko.pipeline @Diamond rank 1 {
   }
 }
 
-// A cycle that collects nothing runs to its end for each strip; the list behind
+// A cycle that collects nothing runs to its end for each strip; the list after
 // it has all strips.
 // CHECK-LABEL: piko.pipeline @Loop
 // CHECK:           %[[LEFT:.*]] = piko.strips(%{{.*}}) {

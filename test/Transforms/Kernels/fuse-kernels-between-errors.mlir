@@ -1,6 +1,6 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-fuse-kernels))' --split-input-file --verify-diagnostics %s
 
-// Lists of empty bins behind a list that has none.
+// Lists of empty bins after a list that has none.
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @P rank 1 {
   piko.source @a
@@ -19,7 +19,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -54,7 +54,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -94,7 +94,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -133,7 +133,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -200,7 +200,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -241,7 +241,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [@F] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):

@@ -19,7 +19,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   // expected-note @below {{it is fed from several places}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
@@ -54,7 +54,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   // expected-note @below {{its bins are of another size}}
   piko.stage @b bins [16] threads 1 : list @F -> [] {
     piko.assign {
@@ -85,7 +85,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [0] threads 1 : list @F -> [] {
     piko.process {
     ^bb0(%l: !piko.list<@F>):
@@ -116,7 +116,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -151,7 +151,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -188,7 +188,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -224,7 +224,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):
@@ -264,7 +264,7 @@ piko.pipeline @P rank 1 {
       piko.return
     }
   }
-  // expected-remark @below {{stage 'b' does not run bin by bin behind stage 'a'}}
+  // expected-remark @below {{stage 'b' does not run bin by bin after stage 'a'}}
   piko.stage @b bins [8] threads 1 : list @F -> [] {
     piko.assign {
     ^bb0(%f: !piko.prim<@F>):

@@ -202,7 +202,7 @@ piko.pipeline @P rank 1 {
   piko.source @split
   piko.edge @split[0] -> @split
   piko.edge @split[1] -> @last
-  // expected-note @below {{the stage is on a cycle, and may not run at all; let one behind the cycle do that}}
+  // expected-note @below {{the stage is on a cycle, and may not run at all; let one after the cycle do that}}
   piko.stage @split bins [8] threads 1 ordered placed : @F -> [@F, @F] {}
   piko.stage @last bins [8] threads 1 ordered placed : @F -> [] {}
   piko.kernel @kernel_split {

@@ -53,7 +53,7 @@ piko.pipeline @Items rank 2 {
   }
 }
 
-// Work behind a local barrier shares the tile with what stands in front, and may
+// Work after a local barrier shares the tile with what stands in front, and may
 // read and store pixels that are proved to be in the bin; who reads the image
 // comes later. A clear of nothing goes.
 // CHECK-LABEL: piko.pipeline @Lists

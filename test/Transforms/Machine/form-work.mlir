@@ -3,7 +3,7 @@
 
 piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 
-// The consumer's assign phase stands behind each emission, and says where what
+// The consumer's assign phase stands after each emission, and says where what
 // was emitted goes. Nothing says how many threads there are.
 // CHECK-LABEL: piko.pipeline @P
 // CHECK:         piko.stage @a {{.*}} split :

@@ -3,7 +3,7 @@
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32[3 : 4] at 8} size 20 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4
 
-// What was stored is known, and so is what was read, also behind a store to
+// What was stored is known, and so is what was read, also after a store to
 // another field or to another element of an array, and in conditions and loops.
 // CHECK-LABEL: piko.kernel @known
 // CHECK:         piko.items
@@ -58,7 +58,7 @@ piko.pipeline @P rank 1 {
   }
 
   // A store to what may be the same element, one in a condition, one that a later
-  // turn comes behind, an atomic operation, and a parallel loop end what is known;
+  // iteration comes after, an atomic operation, and a parallel loop end what is known;
   // each primitive begins anew.
   // CHECK-LABEL: piko.kernel @unknown
   // CHECK:         piko.store %[[V:.*]], @out[%[[I:.*]] : i32] "x" : f32
@@ -104,7 +104,7 @@ piko.pipeline @P rank 1 {
         }
         %before = piko.load @count[%i : i32] "n" : i32
         piko.atomic add @count[%i : i32] "n", %one : i32
-        %behind = piko.load @count[%i : i32] "n" : i32
+        %again = piko.load @count[%i : i32] "n" : i32
         piko.store %before, @count[%j : i32] "n" : i32
         piko.parallel_for %c9 {
         ^bb0(%k: index):
@@ -112,7 +112,7 @@ piko.pipeline @P rank 1 {
           piko.yield
         }
         %last = piko.load @count[%i : i32] "n" : i32
-        piko.store %last, @count[%behind : i32] "n" : i32
+        piko.store %last, @count[%again : i32] "n" : i32
       }
     }
   }

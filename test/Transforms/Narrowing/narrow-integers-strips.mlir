@@ -104,7 +104,7 @@ piko.pipeline @P rank 2 {
     } {piko.rows}
   }
 
-  // What rows hand on, and nobody uses behind them, begins with what it has in the
+  // What rows hand on, and nobody uses after them, begins with what it has in the
   // strip's first row.
   // CHECK-LABEL: piko.kernel @carried
   // CHECK:         scf.if %{{.*}} {
@@ -172,7 +172,7 @@ piko.pipeline @P rank 2 {
   }
 
   // What is left in rows: a pixel that another one reads, one whose row and column
-  // change places, what is not behind a condition alone, upright bounds, and loops
+  // change places, what is not under a condition alone, upright bounds, and loops
   // that keep their order.
   // CHECK-NOT:     step %c8_i32
   // CHECK-LABEL: piko.kernel @end

@@ -11,7 +11,7 @@ piko.record @Count {"n" : i32 at 0, "scale" : i32 at 4, "of" : i32[4 : 4] at 8} 
 // CHECK-DAG:       %[[SEEN:.*]] = piko.cpu.private_copy max_unsigned @seen "key" of %[[W]] often
 // CHECK-DAG:       %[[N:.*]] = piko.cpu.private_copy add @counts "n" of %[[W]]{{$}}
 // CHECK-DAG:       %[[OF:.*]] = piko.cpu.private_copy xor @counts "of" of %[[W]]{{$}}
-// CHECK:           piko.storage.unit_cells
+// CHECK:           piko.storage.unit_buckets
 // CHECK:             piko.load @counts[%{{.*}}] "scale"
 // CHECK:             piko.atomic add @counts[%{{.*}} : i32] "n", %{{.*}} in %[[N]] : i32
 // CHECK:             piko.atomic add @counts[%{{.*}} : i32] "n", %{{.*}} in %[[N]] : i32

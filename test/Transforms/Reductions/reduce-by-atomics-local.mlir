@@ -6,7 +6,7 @@ piko.record @F {"x" : i32 at 0, "z" : f32 at 4, "n" : i32 at 8} size 12 align 4
 piko.record @Z {"z" : f32 at 0, "n" : i32 at 4} size 8 align 4
 
 // Threads share what has come along a local edge: work on the same finds out
-// what is first, in front of the work itself.
+// what is first, before the work itself.
 // CHECK-LABEL: piko.pipeline @Local
 // CHECK-NOT:     precedes
 // CHECK:         piko.items of @a {

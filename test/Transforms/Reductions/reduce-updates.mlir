@@ -129,7 +129,7 @@ piko.pipeline @Counts rank 1 {
   }
 }
 
-// What a branch chooses may have been computed in front of it, or in it.
+// What a branch chooses may have been computed before it, or in it.
 // CHECK-LABEL: piko.pipeline @Conditions
 // CHECK-NOT:     piko.update
 // CHECK:         %[[C:.*]] = arith.cmpi sgt

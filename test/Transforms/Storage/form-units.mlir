@@ -12,9 +12,9 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK:           %[[UNITS:.*]] = piko.storage.unit_count %[[BINS]]
 // CHECK:           scf.forall (%[[UNIT:.*]]) in (%[[UNITS]])
 // CHECK:             %[[W:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]]
-// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_cells %[[BINS]][%[[UNIT]]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_buckets %[[BINS]][%[[UNIT]]]
 // CHECK:             scf.for %[[CELL:.*]] = %[[C0]] to %[[C1]]
-// CHECK:               %[[LO:.*]], %[[HI:.*]] = piko.storage.cell_range %[[BINS]][%[[UNIT]], %[[CELL]]]
+// CHECK:               %[[LO:.*]], %[[HI:.*]] = piko.storage.bucket_range %[[BINS]][%[[UNIT]], %[[CELL]]]
 // CHECK:               scf.for %[[I:.*]] = %[[LO]] to %[[HI]]
 // CHECK:                 %[[P:.*]] = piko.storage.item %[[BINS]][%[[I]]]
 // CHECK:                 %[[X:.*]] = piko.get %[[P]] "x"
@@ -31,7 +31,7 @@ piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
 // CHECK:           {piko.units = #piko<units shared>}
 // CHECK:           piko.storage.close_bins %[[BINS]]
 // CHECK:         piko.kernel @kernel_b
-// CHECK:           %[[BIN:.*]] = piko.storage.cell_bin
+// CHECK:           %[[BIN:.*]] = piko.storage.bucket_bin
 // CHECK:           piko.update @image{{.*}} in %[[BIN]]
 piko.pipeline @P rank 2 {
   piko.image @image : @F rank 2
@@ -119,7 +119,7 @@ piko.pipeline @Box rank 2 {
 // CHECK:         piko.kernel @kernel_a
 // CHECK:           %[[B:.*]] = piko.storage.open_bins @a
 // CHECK:           scf.forall (%[[UNIT:.*]]) in
-// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_cells %[[B]][%[[UNIT]]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_buckets %[[B]][%[[UNIT]]]
 // CHECK:             scf.for %[[CALL:.*]] = %[[C0]] to %[[C1]]
 // CHECK:               %[[I0:.*]], %[[I1:.*]] = piko.storage.call_range %[[B]][%[[CALL]]]
 // CHECK:               %[[L:.*]] = piko.storage.list %[[B]][%[[I0]] to %[[I1]]]
@@ -193,7 +193,7 @@ piko.pipeline @Lists rank 2 {
 // CHECK:             %[[W:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]] : !piko.bins<@F>
 // CHECK-DAG:         %[[V:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]] of @b
 // CHECK-DAG:         %[[U:.*]] = piko.cpu.open_writer %[[BINS]][%[[UNIT]]] of @c
-// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_cells %[[BINS]]
+// CHECK:             %[[C0:.*]], %[[C1:.*]] = piko.storage.unit_buckets %[[BINS]]
 // CHECK:             scf.for %[[CALL:.*]] = %[[C0]] to %[[C1]]
 // CHECK:               %[[BIN:.*]] = piko.storage.call_bin %[[BINS]][%[[CALL]]]
 // CHECK:               piko.storage.append %[[W]][0]
@@ -205,14 +205,14 @@ piko.pipeline @Lists rank 2 {
 // CHECK:               scf.if %[[ENDS]] {
 // CHECK:                 piko.storage.local_bin @b from %[[W]][0] writer %[[V]] {
 // CHECK-NEXT:            ^bb0(%[[LIST:.*]]: !piko.bins<@F>):
-// CHECK:                   piko.storage.unit_cells %[[LIST]][%c0]
+// CHECK:                   piko.storage.unit_buckets %[[LIST]][%c0]
 // CHECK:                   piko.storage.call_range %[[LIST]]
 // CHECK:                   piko.storage.append %[[V]][0]
 // CHECK:                   piko.storage.append_bin %[[V]][0] of @c in %[[BIN]]
 // CHECK:                   piko.storage.next %[[V]]
 // CHECK:                 piko.storage.local_bin @c from %[[V]][0] writer %[[U]] {
 // CHECK-NEXT:            ^bb0(%[[ITEMS:.*]]: !piko.bins<@F>):
-// CHECK:                   piko.storage.cell_range %[[ITEMS]][%c0, %c0]
+// CHECK:                   piko.storage.bucket_range %[[ITEMS]][%c0, %c0]
 // CHECK:                   piko.storage.item %[[ITEMS]]
 // CHECK:                   piko.update @image{{.*}} in %[[BIN]]
 // CHECK:                   piko.storage.next %[[U]]

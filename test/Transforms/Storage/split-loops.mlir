@@ -66,7 +66,7 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:               piko.storage.append
 // CHECK:             } {piko.lanes}
 // CHECK:           piko.cpu.scratch_release %[[W]][%[[MARK]]]
-// CHECK-NOT:     piko.defer
+// CHECK-NOT:     piko.reorder
 piko.pipeline @Across rank 1 {
   piko.source @a
   piko.edge @a[0] -> @b
@@ -107,17 +107,17 @@ piko.pipeline @Across rank 1 {
 // emits more than once, so emissions wait for their order.
 piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Uniform
-// CHECK:         piko.cpu.defer_begin %[[W:.*]][%[[N:.*]]]
+// CHECK:         piko.cpu.reorder_begin %[[W:.*]][%[[N:.*]]]
 // CHECK:         scf.for %{{.*}} = %c0 to %[[N]]
 // CHECK:         scf.while
 // CHECK:           scf.for
 // CHECK:           scf.condition
 // CHECK:         } do {
 // CHECK:           scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
-// CHECK:             piko.cpu.defer_iteration %[[W]][%[[I]]]
+// CHECK:             piko.cpu.reorder_iteration %[[W]][%[[I]]]
 // CHECK:             piko.storage.append
 // CHECK:           scf.for
-// CHECK:         piko.cpu.defer_end %[[W]]
+// CHECK:         piko.cpu.reorder_end %[[W]]
 // CHECK-NOT:     piko.fail_barrier
 piko.pipeline @Uniform rank 1 {
   piko.source @a

@@ -9,8 +9,8 @@ piko.pipeline @P rank 2 {
   piko.stage @a bins [16, 16] threads 64 : @Box -> [] {}
 
   // What follows from a box is computed for eight of them, and written to tables;
-  // of one or none they are as they were. What the loop takes is read in front of
-  // it, behind the condition; what the record has is read there as it was. The
+  // of one or none they are as they were. What the loop takes is read before
+  // it, under the condition; what the record has is read there as it was. The
   // condition says that there is one beside it, which stays where it is.
   // CHECK-LABEL: piko.kernel @k
   // CHECK:         %[[SEEN:.*]] = memref.alloca() {alignment = 64 : i64} : memref<8xi32>
@@ -52,8 +52,8 @@ piko.pipeline @P rank 2 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Box>
     %units = piko.storage.unit_count %bins : !piko.bins<@Box>
     scf.forall (%u) in (%units) {
-      %begin, %end = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Box>
-      // expected-remark @+1 {{stage 'a': what follows from a primitive in front of the loops of its turn is computed for 8 primitives at once}}
+      %begin, %end = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Box>
+      // expected-remark @+1 {{stage 'a': what follows from a primitive before the loops of its iteration is computed for 8 primitives at once}}
       scf.for %i = %begin to %end step %c1 {
         %p = piko.storage.item %bins[%i] : !piko.bins<@Box> -> !piko.prim<@Box>
         %x = piko.get %p "x" : !piko.prim<@Box> -> f32
@@ -101,7 +101,7 @@ piko.pipeline @P rank 2 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Box>
     %units = piko.storage.unit_count %bins : !piko.bins<@Box>
     scf.forall (%u) in (%units) {
-      %begin, %end = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Box>
+      %begin, %end = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Box>
       scf.for %i = %begin to %end step %c1 {
         %p = piko.storage.item %bins[%i] : !piko.bins<@Box> -> !piko.prim<@Box>
         %x = piko.get %p "x" : !piko.prim<@Box> -> f32

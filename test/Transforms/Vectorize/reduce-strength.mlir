@@ -33,7 +33,7 @@ piko.pipeline @P rank 2 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Box>
     %units = piko.storage.unit_count %bins : !piko.bins<@Box>
     scf.forall (%u) in (%units) {
-      %begin, %end = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Box>
+      %begin, %end = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Box>
       scf.for %i = %begin to %end step %c1 {
         %p = piko.storage.item %bins[%i] : !piko.bins<@Box> -> !piko.prim<@Box>
         %x = piko.get %p "x" : !piko.prim<@Box> -> i32
@@ -56,8 +56,8 @@ piko.pipeline @P rank 2 {
   }
 
   // A difference from what does not grow falls, a product grows by the factor's
-  // multiple, also behind a condition; a primitive that the condition says is
-  // there is not read in front of the loop.
+  // multiple, also under a condition; a primitive that the condition says is
+  // there is not read before the loop.
   // CHECK-LABEL: piko.kernel @kinds
   // CHECK:         %[[STEP:.*]] = arith.constant dense<-3> : vector<8xi32>
   // CHECK:         scf.forall
@@ -78,7 +78,7 @@ piko.pipeline @P rank 2 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Box>
     %units = piko.storage.unit_count %bins : !piko.bins<@Box>
     scf.forall (%u) in (%units) {
-      %begin, %end = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Box>
+      %begin, %end = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Box>
       %any = arith.cmpi slt, %begin, %end : index
       scf.for %row = %i0 to %i16 step %i1 : i32 {
         scf.if %any {

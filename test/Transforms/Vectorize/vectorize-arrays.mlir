@@ -2,7 +2,7 @@
 
 // A sorted insertion into a short array of each lane. Lanes that are still in
 // the loop are at one place, as they began at one: rows, of which the first
-// lanes that leave keep what they have. Behind it they are in different places,
+// lanes that leave keep what they have. After it they are in different places,
 // and each row is written by those that are there.
 piko.record @V {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Insert

@@ -44,7 +44,7 @@ piko.pipeline @Tested rank 1 {
           %one = piko.load checked @table[%i : i32] "z" : f32
           scf.yield %one : f32
         } else {
-          %bin = piko.storage.cell_bin %bins[%c0] : !piko.bins<@V>
+          %bin = piko.storage.bucket_bin %bins[%c0] : !piko.bins<@V>
           piko.fail @a in %bin outside @table(%place)
           scf.yield %zero : f32
         }

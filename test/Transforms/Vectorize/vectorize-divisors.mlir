@@ -29,7 +29,7 @@ piko.pipeline @P rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@N>
     %n = piko.storage.unit_count %bins : !piko.bins<@N>
     scf.forall (%u) in (%n) {
-      %bin = piko.storage.cell_bin %bins[%c0] : !piko.bins<@N>
+      %bin = piko.storage.bucket_bin %bins[%c0] : !piko.bins<@N>
       %d = piko.load checked @in[%u : index] "n" : i32
       scf.for %x = %c0 to %n step %c1 {
         %v = piko.load checked @in[%x : index] "n" : i32

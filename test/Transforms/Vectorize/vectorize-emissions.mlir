@@ -3,7 +3,7 @@
 piko.record @F {"z" : f32 at 0, "k" : i32 at 4} size 8 align 4
 piko.record @G {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
 
-// Two records of each lane, one behind a condition, and a bin for each: where
+// Two records of each lane, one under a condition, and a bin for each: where
 // positions are not counted, and lanes are many, vectors emit both.
 // CHECK-LABEL: piko.pipeline @Emits
 // CHECK:         %[[W:.*]] = piko.cpu.open_writer
@@ -32,7 +32,7 @@ piko.pipeline @Emits rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>
@@ -87,7 +87,7 @@ piko.pipeline @Boxes rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>
@@ -136,7 +136,7 @@ piko.pipeline @Halves rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>

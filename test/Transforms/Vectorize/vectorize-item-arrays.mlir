@@ -26,7 +26,7 @@ piko.pipeline @Again rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %n = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@P>
       scf.for %i = %lo to %hi step %c1 {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
         %index = piko.get %p "index" : !piko.prim<@P> -> i32
@@ -65,7 +65,7 @@ piko.pipeline @Once rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %n = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@P>
       scf.for %i = %lo to %hi step %c1 {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
         %index = piko.get %p "index" : !piko.prim<@P> -> i32

@@ -4,7 +4,7 @@ piko.record @F {"z" : f32 at 0, "k" : i32 at 4} size 8 align 4
 piko.record @G {"y" : f32 at 0} size 4 align 4
 
 // Primitives as lanes: their fields are read by address, what is emitted on two
-// sides of a condition follows behind, in the order of lanes, and a writer that
+// sides of a condition follows after, in the order of lanes, and a writer that
 // counts goes through all of them.
 // CHECK-LABEL: piko.pipeline @Emits
 // CHECK:         scf.for %[[I:.*]] = %{{.*}} to %{{.*}} step %c16 {
@@ -42,7 +42,7 @@ piko.pipeline @Emits rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>
@@ -97,7 +97,7 @@ piko.pipeline @Updates rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>
@@ -141,7 +141,7 @@ piko.pipeline @Chooses rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>
@@ -178,7 +178,7 @@ piko.pipeline @Stays rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@F>
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is not vectorized: each lane would have a copy of this array, which is large}}
       scf.for %i = %lo to %hi step %c1 {
         // expected-note@+1 {{here}}

@@ -76,7 +76,7 @@ piko.pipeline @Boxes rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@B>
     %n = piko.storage.unit_count %bins : !piko.bins<@B>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@B>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@B>
       // expected-remark-re@+1 {{stage 'a': process is vectorized for {{4|8}} primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>

@@ -131,7 +131,7 @@ piko.pipeline @Tree rank 1 {
 
 // -----
 
-// What is emitted in front of a barrier comes in the order of iterations: the
+// What is emitted before a barrier comes in the order of iterations: the
 // loop is cut, and emits what was kept.
 piko.record @F {"z" : f32 at 0, "n" : i32 at 4} size 8 align 4
 // CHECK-LABEL: piko.pipeline @Emits
@@ -178,7 +178,7 @@ piko.pipeline @Emits rank 1 {
 
 // -----
 
-// So it is where iterations may part ways in front of one.
+// So it is where iterations may part ways before one.
 piko.record @F {"z" : f32 at 0, "n" : i32 at 4} size 8 align 4
 // CHECK-LABEL: piko.pipeline @Parts
 // CHECK:         piko.cpu.scratch

@@ -41,7 +41,7 @@ piko.pipeline @Boxes rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@B>
     %n = piko.storage.unit_count %bins : !piko.bins<@B>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@B>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@B>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>
@@ -77,8 +77,8 @@ piko.pipeline @Boxes rank 1 {
 piko.record @B {"w" : i32 at 0, "z" : f32 at 4} size 8 align 4
 piko.record @N {"n" : f32 at 0} size 4 align 4
 
-// A sum that goes from turn to turn, and stores, of which the last one stays,
-// keep a lane's turns in order: all lanes run in step.
+// A sum that goes from iteration to iteration, and stores, of which the last one stays,
+// keep a lane's iterations in order: all lanes run in step.
 // CHECK-LABEL: piko.pipeline @Carried
 // CHECK-NOT:     vector.shuffle
 // CHECK:         scf.while
@@ -96,7 +96,7 @@ piko.pipeline @Carried rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@B>
     %n = piko.storage.unit_count %bins : !piko.bins<@B>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@B>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@B>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>

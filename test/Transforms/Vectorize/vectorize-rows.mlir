@@ -1,7 +1,7 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
 
 // An index that is limited to the ends of a row is tested for lanes that read
-// one element behind the other, before what is the same for all is added; what
+// one element after the other, before what is the same for all is added; what
 // is squared is gathered.
 piko.record @V {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Limited

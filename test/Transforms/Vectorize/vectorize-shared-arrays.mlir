@@ -1,6 +1,6 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize,canonicalize,cse))' --split-input-file %s | FileCheck %s
 
-// An array that is filled in front of the lanes' loop is the same for all of
+// An array that is filled before the lanes' loop is the same for all of
 // them. Lanes that are still in a loop are at one place of it, so that what
 // stands there is one number, and what it leads to is loaded once.
 piko.record @V {"z" : f32 at 0} size 4 align 4

@@ -4,8 +4,8 @@
 piko.record @B {"w" : i32 at 0, "v" : i32 at 4} size 8 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4
 
-// What pairs of a primitive and a turn change in a private copy is compressed into
-// lists; a scalar loop goes through these when they are full, and behind the loop
+// What pairs of a primitive and an iteration change in a private copy is compressed into
+// lists; a scalar loop goes through these when they are full, and after the loop
 // over primitives. A value that all lanes share, but not all primitives, is in a
 // list, too. With fewer lanes there is no such instruction, and lanes take turns.
 // CHECK-LABEL: piko.pipeline @Listed
@@ -53,7 +53,7 @@ piko.pipeline @Listed rank 1 {
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@B>
       %copy = piko.cpu.private_copy add @sums "n" of %writer often
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@B>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@B>
       scf.for %i = %lo to %hi step %step {
         %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>
         %w = piko.get %b "w" : !piko.prim<@B> -> i32
@@ -92,7 +92,7 @@ piko.pipeline @Listed rank 1 {
     %bins = piko.storage.open_bins @l : !piko.bins<@B>
     %n = piko.storage.unit_count %bins : !piko.bins<@B>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@B>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@B>
       scf.for %i = %lo to %hi step %step {
         %b = piko.storage.item %bins[%i] : !piko.bins<@B> -> !piko.prim<@B>
         %w = piko.get %b "w" : !piko.prim<@B> -> i32

@@ -29,7 +29,7 @@ piko.pipeline @Turns rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@F>
     scf.forall (%u) in (%n) {
       %writer = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@F>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@F>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@F> -> !piko.prim<@F>

@@ -30,7 +30,7 @@ piko.pipeline @Near rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@Row>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once, and held one after the other as well, to measure which is faster: }}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -76,7 +76,7 @@ piko.pipeline @Specified rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@Row>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -123,7 +123,7 @@ piko.pipeline @Far rank 1 {
     %n = piko.storage.unit_count %bins : !piko.bins<@D>
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@D>
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@D>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@D>
       // expected-remark@+1 {{stage 'a': process is not vectorized: 16 at once are expected to take}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@D> -> !piko.prim<@D>

@@ -30,7 +30,7 @@ inline constexpr int launcherFile = 3;
 inline constexpr size_t mostFiles = 64;
 inline constexpr size_t longestName = 64;
 
-/// At the beginning of the request's bytes; behind it are the arguments and the
+/// At the beginning of the request's bytes; after it are the arguments and the
 /// environment, each string with its zero.
 struct Request {
   int32_t arguments, variables;

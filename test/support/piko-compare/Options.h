@@ -52,7 +52,7 @@ struct Options {
   /// The C++ that the reference executor runs.
   std::string reference;
   Case one;
-  /// A file with the options of a case in each line, or of C++ in each line behind
+  /// A file with the options of a case in each line, or of C++ in each line after
   /// `// CASE: `, where all cases must write something; empty = the one case. What a
   /// case leaves out is as in `one`.
   std::string cases;
@@ -72,9 +72,8 @@ struct Options {
   /// targets.
   bool stops = false;
   /// How much LLVM optimizes its code: -O0 to -O3. For other processors than the
-  /// first target's it is less unless asked for: what sets them apart is done in
-  /// front of its optimizer, and behind it from -O1 on. What runs beside a GPU, or
-  /// plays one, is not optimized: it is the passes that divide kernels among threads
+  /// first target's it is less unless asked for: what sets them apart is done before its optimizer, and after it from -O1 on. What runs beside a GPU, or
+  /// emulates one, is not optimized: it is the passes that divide kernels among threads
   /// which are tested there, and the kernels' PTX is optimized.
   std::optional<int> optLevel;
   int getOptLevel(const Target &target) const {

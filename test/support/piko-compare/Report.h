@@ -14,7 +14,7 @@
 class Report {
 public:
   void add(const std::string &target, const std::string &line);
-  /// Each line once, in the order in which they came, behind the names of its
+  /// Each line once, in the order in which they came, after the names of its
   /// targets.
   void print() const;
 

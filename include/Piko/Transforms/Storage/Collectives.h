@@ -26,7 +26,7 @@ void createSort(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value count,
                 mlir::Value ranks);
 
 /// The same, with the same bits, where lanes share the loops inside: these are
-/// marked, count by one, and have independent turns.
+/// marked, count by one, and have independent iterations.
 void createSharedReduction(mlir::OpBuilder &builder, mlir::Location loc,
                            mlir::Value count, mlir::ValueRange slots,
                            mlir::Block &combine);

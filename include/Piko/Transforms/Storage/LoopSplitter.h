@@ -72,7 +72,7 @@ private:
   /// The piece that an operation is in, or null.
   mlir::scf::ForOp pieceOf(mlir::Operation *op) const;
   /// Replaces uses outside `home` by what `read` gives: at the front of a piece
-  /// with its iteration, or in front of the user with iteration 0.
+  /// with its iteration, or before the user with iteration 0.
   void replaceUses(
       mlir::Value value, mlir::scf::ForOp home,
       llvm::function_ref<mlir::Value(mlir::OpBuilder &, mlir::Value)> read);

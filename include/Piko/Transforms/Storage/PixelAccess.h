@@ -38,7 +38,7 @@ public:
   void changeIn(mlir::OpBuilder &builder, ImageOp image, AtomicKind kind,
                 mlir::Value value);
 
-  /// `createInsideTest` in front of the update.
+  /// `createInsideTest` before the update.
   mlir::scf::IfOp createTest(mlir::OpBuilder &builder, mlir::TypeRange results);
 
 private:

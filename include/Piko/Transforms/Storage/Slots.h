@@ -17,7 +17,7 @@ namespace piko {
 class Slots {
 public:
   /// Writes at `builder` code that takes the memory and, where there are any
-  /// iterations and there is room, runs what is then put in front of `inside`.
+  /// iterations and there is room, runs what is then put before `inside`.
   Slots(mlir::OpBuilder &builder, mlir::Location loc, mlir::Value writer,
         mlir::Value count);
 

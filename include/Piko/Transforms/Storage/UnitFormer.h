@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Structured work as loops over what is stored, for every target: units of
-// work, in them cells or calls, in them primitives.
+// work, in them buckets or calls, in them primitives.
 
 #ifndef PIKO_TRANSFORMS_STORAGE_UNITFORMER_H
 #define PIKO_TRANSFORMS_STORAGE_UNITFORMER_H
@@ -25,7 +25,7 @@ public:
 
 protected:
   /// Opens `bins` and makes what runs units: `unit` is the number of one, whose
-  /// work goes in front of `unitEnd`.
+  /// work goes before `unitEnd`.
   virtual void createUnits(StageOp stage, mlir::IntegerAttr source);
   /// Where a unit leaves what the kernel's stage emits, or what the other does.
   virtual mlir::Value createWriter(mlir::Location at,
@@ -44,9 +44,9 @@ private:
   void createWriters();
   void convertSource(ItemsOp items);
   void convertBins(BinsOp over);
-  /// A loop over the unit's cells, or its calls.
+  /// A loop over the unit's buckets, or its calls.
   mlir::scf::ForOp createUnitLoop();
-  void passOverEmptyBins(CellRangeOp range, mlir::scf::ForOp loop);
+  void passOverEmptyBins(BucketRangeOp range, mlir::scf::ForOp loop);
   /// Where what follows the last batch of a bin goes.
   mlir::Block *createBinEnd(mlir::Value call, mlir::Value bin);
   /// Makes a loop over primitives of work on them, or takes one list.

@@ -102,8 +102,8 @@ static void useClosedForms(scf::ForOp loop) {
       !isConstantIntValue(loop.getStep(), 1))
     return;
   Location loc = loop.getLoc();
-  OpBuilder inside = OpBuilder::atBlockBegin(loop.getBody()), behind(loop);
-  behind.setInsertionPointAfter(loop);
+  OpBuilder inside = OpBuilder::atBlockBegin(loop.getBody()), after(loop);
+  after.setInsertionPointAfter(loop);
   Value lo = loop.getLowerBound(), hi = loop.getUpperBound(), count, trips;
   llvm::BitVector dropped(loop.getNumResults());
   for (unsigned i = 0, e = loop.getNumResults(); i < e; ++i) {
@@ -119,11 +119,11 @@ static void useClosedForms(scf::ForOp loop) {
     if (loop.getResult(i).use_empty())
       continue;
     if (!trips) {
-      Value end = arith::MaxSIOp::create(behind, loc, lo, hi);
-      trips = arith::SubIOp::create(behind, loc, end, lo);
+      Value end = arith::MaxSIOp::create(after, loc, lo, hi);
+      trips = arith::SubIOp::create(after, loc, end, lo);
     }
     loop.getResult(i).replaceAllUsesWith(
-        createValue(behind, first, *recurrence, trips));
+        createValue(after, first, *recurrence, trips));
   }
   if (dropped.any())
     dropIterArgs(loop, dropped);

@@ -53,7 +53,7 @@ static SmallVector<scf::IfOp> findBranches(Operation *update, Operation *loop) {
   return branches;
 }
 
-/// What a branch has in front of an operation and uses after it.
+/// What a branch has before an operation and uses after it.
 static llvm::SetVector<Value> findCrossing(Operation *middle) {
   llvm::SetVector<Value> crossing;
   for (Operation &op : *middle->getBlock())

@@ -4,10 +4,21 @@
 //   1. choose how many threads a block has;
 //   2. where all that others see of it are pixels, let threads take the pixels
 //      of many primitives (PixelNest.h), or else of one after the other
-//      (PixelOwners.h);
+//      (PixelOwners.h). Before, loops that count become scf.for, numbers that
+//      loops over pixels step become closed forms, and what pixels have in
+//      common moves out of their loops;
 //   3. otherwise say of each piece of work and each parallel loop who takes its
 //      items or iterations (WorkLegality.h), and group updates whose pixels
 //      follow from data (GroupUpdates.h).
+// What mappings ask for:
+//   collapsed  a primitive has one nest of loops over the pixels of a box, or
+//              one pixel, which its setup finds, and the block needs at most
+//              384 bytes of shared memory a thread;
+//   pixels     all that has an effect follows from the update of a pixel;
+//   shared     no two primitives, or iterations, update one pixel;
+//   by_count   as shared, where primitives have parallel loops: the grid
+//              chooses when it runs;
+//   lockstep   iterations are at most as many as the threads.
 
 #include "PikoToGPU/Mapping/GroupUpdates.h"
 #include "PikoToGPU/Mapping/PixelOwners.h"
@@ -232,11 +243,22 @@ void ThreadMapper::run() {
 // The pass
 //===----------------------------------------------------------------------===//
 
+/// Whether one block does all that is in a bin: a list, or what updates pixels.
+static bool hasBlockForBin(KernelOp kernel) {
+  bool isWhole = false;
+  kernel.walk([&](WorkOpInterface work) {
+    isWhole |= !isa<ItemsOp>(*work) || !isIndependent(work);
+  });
+  return isWhole;
+}
+
 /// As many as the stage has, but not much fewer than a bin has pixels: a device
 /// has few blocks then, and each of them takes long.
-static int64_t chooseThreads(StageOp stage) {
+static int64_t chooseThreads(StageOp stage, KernelOp kernel) {
   constexpr uint64_t pixelsOfThread = 16, most = 256;
   uint64_t pixels = 1, threads = stage.getThreads();
+  if (llvm::is_contained(stage.getBins(), 0) && hasBlockForBin(kernel))
+    threads = std::max(threads, most); // the whole domain
   for (int64_t size : stage.getBins())
     pixels = llvm::SaturatingMultiply<uint64_t>(pixels, size);
   threads = std::max(threads, std::min(pixels / pixelsOfThread, most));
@@ -257,6 +279,8 @@ void MapThreadsPass::runOnOperation() {
     if (!work)
       continue;
     auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
-    ThreadMapper(kernel, stage, threads ? threads : chooseThreads(stage)).run();
+    ThreadMapper(kernel, stage,
+                 threads ? threads : chooseThreads(stage, kernel))
+        .run();
   }
 }

@@ -42,7 +42,7 @@ struct PixelNest {
   /// the primitive: the outermost loop, if there is one.
   mlir::Operation *anchor = nullptr;
   UpdateOp update; ///< Any: all are of the same pixel.
-  /// Other branches of conditions in front of the nest, with effects: a
+  /// Other branches of conditions before the nest, with effects: a
   /// primitive that takes one is *rare*.
   llvm::SmallVector<mlir::Block *> rare;
 

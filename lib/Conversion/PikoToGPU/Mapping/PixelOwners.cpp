@@ -35,7 +35,7 @@ private:
   bool share(UpdateOp update);
   bool canStride(const PixelLoop &loop) const;
   bool guard(UpdateOp update, Value root);
-  /// `first` and all behind it in its block that depends on it.
+  /// `first` and all after it in its block that depends on it.
   bool collectDependents(UpdateOp update, Operation *first,
                          llvm::SetVector<Operation *> &group);
   bool checkGroup(Value root, const llvm::SetVector<Operation *> &group);

@@ -13,8 +13,8 @@ namespace piko {
 /// What a thread does where a coordinate, the root, is one of its own.
 struct OwnedWork {
   mlir::Value root;
-  /// Of a loop, the turns in which its counter is the root; otherwise these
-  /// operations of one block, in order.
+  /// Of a loop, the iterations in which its counter is the root; otherwise
+  /// these operations of one block, in order.
   mlir::Operation *loop = nullptr;
   llvm::SmallVector<mlir::Operation *> operations;
 
@@ -27,8 +27,8 @@ struct OwnedWork {
 };
 
 /// All of a dimension of the domain, or why not all that has an effect is one
-/// thread's. The turns of a loop whose counter is `taken` are shared by another
-/// dimension.
+/// thread's. The iterations of a loop whose counter is `taken` are shared by
+/// another dimension.
 struct OwnedWorks {
   llvm::SmallVector<OwnedWork> works;
   std::optional<Obstacle> obstacle;

@@ -190,18 +190,18 @@ PixelGroup::PixelGroup(int64_t threads, StageOp stage)
     pixels *= extent;
 }
 
-/// Of a block's memory: with more, a multiprocessor has few of its threads at
-/// work. A bin that has so many pixels for a thread has primitives for which
-/// masks cost more than threads that idle: a large triangle has many, and its
-/// test is cheap beside an atomic.
+/// Of a block's shared memory: with more, a multiprocessor has few of its
+/// threads at work. A bin that has so many pixels for a thread has primitives
+/// for which masks cost more than threads that idle: a large triangle has many,
+/// and its test is cheap beside an atomic.
 static constexpr int64_t maxBytesOfThread = 384;
 
 bool PixelGroup::fits(int64_t setupBytes) const {
-  int64_t bytes = threads * setupBytes + 8 * PIKOIR_FLUSH_CELLS + 12 +
+  int64_t bytes = threads * setupBytes + 8 * PIKOIR_FLUSH_WORDS + 12 +
                   8 * size + 4 * words * pixels +
                   llvm::divideCeil(pixels, 32) * 4 + 2 * pixels;
   int64_t most = std::min(
-      maxBlockBytes, maxBytesOfThread * std::max<int64_t>(threads, warpSize));
+      maxSharedBytes, maxBytesOfThread * std::max<int64_t>(threads, warpSize));
   return canCount() && bytes <= most;
 }
 

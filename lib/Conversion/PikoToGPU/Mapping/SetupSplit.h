@@ -55,7 +55,7 @@ private:
   llvm::DenseSet<mlir::Operation *> both; ///< As cheap as a load.
 };
 
-/// The pixels of a group of primitives as one space, in the block's memory.
+/// The pixels of a group of primitives as one space, in shared memory.
 struct PixelGroup {
   PixelGroup(int64_t threads, StageOp stage);
 

@@ -19,7 +19,7 @@
 using namespace mlir;
 using namespace piko;
 
-/// Whether the number of an iteration, which 32 bits hold, is the same behind
+/// Whether the number of an iteration, which 32 bits hold, is the same after
 /// an operation.
 static bool isCast(Operation *op) {
   return isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::TruncIOp,

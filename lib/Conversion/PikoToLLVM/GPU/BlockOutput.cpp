@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What a block does with the outboxes of its threads. A round:
+// What a block does with the append buffers of its threads. A round:
 //   1. threads meet, and go on if one of them has something;
 //   2. they vote whether they have, and a sum over warps gives each its place:
 //      the order is that of threads;
 //   3. one thread takes room for the directory, in which each says what it has;
-//   4. records of a local edge are copied behind those that the block has;
+//   4. records of a local edge are copied after those that the block has;
 //   where
 //      they come to follows from a sum of their numbers.
 
@@ -18,23 +18,25 @@ using namespace mlir;
 using namespace piko;
 
 static constexpr int64_t warpSize = 32;
-/// Behind the numbers of warps: what one thread tells the others.
+/// After the numbers of warps: what one thread tells the others.
 static constexpr int64_t told = warpSize;
 
 namespace {
 
 class BlockOutput {
 public:
-  BlockOutput(OpBuilder &builder, FlushOp op, Value cells, Grid &grid)
-      : code{builder, op.getLoc()}, unit(op.getUnit()), cells(cells),
-        grid(grid), launch(op->getParentOfType<gpu::LaunchOp>()),
+  BlockOutput(OpBuilder &builder, FlushOp op, Value sharedWords,
+              GridContext &grid)
+      : code{builder, op.getLoc()}, unit(op.getUnit()),
+        sharedWords(sharedWords), grid(grid),
+        launch(op->getParentOfType<gpu::LaunchOp>()),
         threads(*getConstantIntValue(launch.getBlockSizeX())) {}
   void publish();
-  void keep(int64_t outbox, int64_t recordBytes);
+  void keep(int64_t buffer, int64_t recordBytes);
 
 private:
   void publish(Value has, Value begin, Value cursor);
-  void keepRecords(Value mine, int64_t outbox, int64_t size);
+  void keepRecords(Value mine, int64_t buffer, int64_t size);
   using P = GridCode::P;
 
   Value lanesOfWarp() {
@@ -45,7 +47,7 @@ private:
   Value countBelow(Value has, Value &total);
   Value sumBelow(Value number, Value &total);
   /// The sum of the warps' numbers below; of each warp one lane is the writer.
-  /// Behind a barrier: what was said in the last round has been read.
+  /// After a barrier: what was said in the last round has been read.
   Value sumOfWarps(Value ofWarp, Value isWriter, Value &total);
   void when(Value condition, llvm::function_ref<void()> body) {
     code.when(condition, body);
@@ -71,8 +73,8 @@ private:
   void copyBytes(Value from, Value to, int64_t size);
 
   GridCode code;
-  Value unit, cells;
-  Grid &grid;
+  Value unit, sharedWords;
+  GridContext &grid;
   gpu::LaunchOp launch;
   int64_t threads;
 };
@@ -85,8 +87,9 @@ Value BlockOutput::sumOfWarps(Value ofWarp, Value isWriter, Value &total) {
   Value warp = arith::DivUIOp::create(builder, loc, narrowThread(),
                                       createI32(builder, loc, warpSize));
   Value place = toIndex(builder, loc, warp);
-  when(isWriter,
-       [&] { memref::StoreOp::create(builder, loc, ofWarp, cells, place); });
+  when(isWriter, [&] {
+    memref::StoreOp::create(builder, loc, ofWarp, sharedWords, place);
+  });
   code.barrier();
   int64_t warps = std::max<int64_t>(1, threads / warpSize);
   auto loop = scf::ForOp::create(
@@ -95,8 +98,8 @@ Value BlockOutput::sumOfWarps(Value ofWarp, Value isWriter, Value &total) {
   {
     OpBuilder::InsertionGuard guard(builder);
     builder.setInsertionPointToStart(loop.getBody());
-    Value number =
-        memref::LoadOp::create(builder, loc, cells, loop.getInductionVar());
+    Value number = memref::LoadOp::create(builder, loc, sharedWords,
+                                          loop.getInductionVar());
     Value other = arith::IndexCastOp::create(builder, loc, code.i32(),
                                              loop.getInductionVar());
     Value isBelow = code.compare(P::ult, other, warp);
@@ -167,11 +170,11 @@ void BlockOutput::link(Value directory) {
   code.store(directory, mine, last);
 }
 
-/// Of the log's outbox.
+/// Of the log's append buffer.
 Value BlockOutput::getWord(int64_t which) {
   if (!grid.forErrors)
-    return code.get(grid.outboxes, which);
-  Value words = code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+    return code.get(grid.buffers, which);
+  Value words = code.get(grid.buffers, PIKOIR_APPEND_BEGIN);
   Value none = code.constant(0);
   return code.choose(
       code.compare(P::ne, words, none),
@@ -182,8 +185,8 @@ Value BlockOutput::getWord(int64_t which) {
 }
 
 void BlockOutput::publish() {
-  Value begin = getWord(PIKOIR_OUTBOX_BEGIN);
-  Value cursor = getWord(PIKOIR_OUTBOX_CURSOR);
+  Value begin = getWord(PIKOIR_APPEND_BEGIN);
+  Value cursor = getWord(PIKOIR_APPEND_CURSOR);
   Value has = code.compare(P::ne, begin, cursor);
   when(code.meetAny(has), [&] { publish(has, begin, cursor); });
 }
@@ -201,11 +204,11 @@ void BlockOutput::publish(Value has, Value begin, Value cursor) {
       code.store(total, piece, offsetof(pikoir_piece, spans));
       link(piece);
     });
-    code.set(piece, cells, told);
+    code.set(piece, sharedWords, told);
   });
   code.barrier();
   when(has, [&] {
-    Value piece = code.get(cells, told);
+    Value piece = code.get(sharedWords, told);
     when(code.compare(P::ne, piece, code.constant(0)), [&] {
       Value at = code.add(code.add(piece, code.constant(header)),
                           code.mul(place, code.constant(span)));
@@ -213,10 +216,10 @@ void BlockOutput::publish(Value has, Value begin, Value cursor) {
       code.store(cursor, at, offsetof(pikoir_span, end));
     });
     if (grid.forErrors)
-      code.store(cursor, code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN),
-                 8 * PIKOIR_OUTBOX_BEGIN);
+      code.store(cursor, code.get(grid.buffers, PIKOIR_APPEND_BEGIN),
+                 8 * PIKOIR_APPEND_BEGIN);
     else
-      code.set(cursor, grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+      code.set(cursor, grid.buffers, PIKOIR_APPEND_BEGIN);
   });
 }
 
@@ -238,7 +241,7 @@ void BlockOutput::copyBytes(Value from, Value to, int64_t size) {
       });
 }
 
-/// What was placed between two places of an outbox.
+/// What was placed between two places of an append buffer.
 void BlockOutput::copyRecords(Value from, Value end, Value to, int64_t size) {
   OpBuilder &builder = code.builder;
   Location loc = code.loc;
@@ -289,7 +292,7 @@ void BlockOutput::reserveRecords(Value kept, Value most, int64_t base,
   Value isSmall = code.compare(P::ugt, bytes, room);
   code.barrier();
   when(isFirst(), [&] {
-    code.set(code.constant(1), cells, told);
+    code.set(code.constant(1), sharedWords, told);
     when(isSmall, [&] {
       constexpr int64_t header = sizeof(pikoir_piece);
       Value more = code.add(bytes, bytes);
@@ -297,7 +300,7 @@ void BlockOutput::reserveRecords(Value kept, Value most, int64_t base,
                        code.constant(-header));
       Value piece = code.take(grid.log, more, PIKOIR_PIECE_MEMORY);
       Value has = code.compare(P::ne, piece, code.constant(0));
-      code.set(code.extend(has), cells, told);
+      code.set(code.extend(has), sharedWords, told);
       when(has, [&] {
         code.set(code.add(piece, code.constant(header)), kept,
                  base + PIKOIR_LOCAL_RECORDS);
@@ -319,21 +322,21 @@ void BlockOutput::reserveRecords(Value kept, Value most, int64_t base,
   });
 }
 
-void BlockOutput::keepRecords(Value mine, int64_t outbox, int64_t size) {
-  int64_t words = outbox * PIKOIR_OUTBOX_WORDS;
-  int64_t base = (outbox - 1) * PIKOIR_LOCAL_WORDS;
+void BlockOutput::keepRecords(Value mine, int64_t buffer, int64_t size) {
+  int64_t words = buffer * PIKOIR_APPEND_WORDS;
+  int64_t base = (buffer - 1) * PIKOIR_LOCAL_WORDS;
   Value kept = grid.kept, total;
   Value below = sumBelow(mine, total);
   Value count = code.get(kept, base + PIKOIR_LOCAL_COUNT);
   Value most = code.add(count, total);
   reserveRecords(kept, most, base, size);
-  Value has = code.compare(P::ne, code.get(cells, told), code.constant(0));
+  Value has =
+      code.compare(P::ne, code.get(sharedWords, told), code.constant(0));
   when(has, [&] {
     Value to = code.add(code.get(kept, base + PIKOIR_LOCAL_RECORDS),
                         code.mul(code.add(count, below), code.constant(size)));
-    copyRecords(code.get(grid.outboxes, words + PIKOIR_OUTBOX_BEGIN),
-                code.get(grid.outboxes, words + PIKOIR_OUTBOX_CURSOR), to,
-                size);
+    copyRecords(code.get(grid.buffers, words + PIKOIR_APPEND_BEGIN),
+                code.get(grid.buffers, words + PIKOIR_APPEND_CURSOR), to, size);
   });
   code.barrier();
   when(code.both(has, isFirst()),
@@ -341,35 +344,35 @@ void BlockOutput::keepRecords(Value mine, int64_t outbox, int64_t size) {
   code.barrier();
 }
 
-void BlockOutput::keep(int64_t outbox, int64_t size) {
-  int64_t words = outbox * PIKOIR_OUTBOX_WORDS;
+void BlockOutput::keep(int64_t buffer, int64_t size) {
+  int64_t words = buffer * PIKOIR_APPEND_WORDS;
   Value zero = code.constant(0);
-  Value mine = code.get(grid.outboxes, words + PIKOIR_OUTBOX_KEPT);
+  Value mine = code.get(grid.buffers, words + PIKOIR_APPEND_KEPT);
   when(code.meetAny(code.compare(P::ne, mine, zero)),
-       [&] { keepRecords(mine, outbox, size); });
-  code.set(code.get(grid.outboxes, words + PIKOIR_OUTBOX_CURSOR), grid.outboxes,
-           words + PIKOIR_OUTBOX_BEGIN);
-  code.set(zero, grid.outboxes, words + PIKOIR_OUTBOX_KEPT);
+       [&] { keepRecords(mine, buffer, size); });
+  code.set(code.get(grid.buffers, words + PIKOIR_APPEND_CURSOR), grid.buffers,
+           words + PIKOIR_APPEND_BEGIN);
+  code.set(zero, grid.buffers, words + PIKOIR_APPEND_KEPT);
 }
 
-void piko::createKeep(OpBuilder &builder, Location loc, const Grid &grid,
-                      int64_t outbox) {
+void piko::createKeep(OpBuilder &builder, Location loc, const GridContext &grid,
+                      int64_t buffer) {
   GridCode code(builder, loc);
-  int64_t words = outbox * PIKOIR_OUTBOX_WORDS;
-  Value last = code.get(grid.outboxes, words + PIKOIR_OUTBOX_LAST);
+  int64_t words = buffer * PIKOIR_APPEND_WORDS;
+  Value last = code.get(grid.buffers, words + PIKOIR_APPEND_LAST);
   Value kind = code.add(last, code.constant(offsetof(pikoir_entry, kind)));
   Value is = createI32(builder, loc, PIKOIR_ENTRY_KEPT);
   Value isNew = code.compare(GridCode::P::ne, code.load(code.i32(), kind), is);
   code.when(isNew, [&] {
     code.store(is, kind);
-    Value count = code.get(grid.outboxes, words + PIKOIR_OUTBOX_KEPT);
-    code.set(code.add(count, code.constant(1)), grid.outboxes,
-             words + PIKOIR_OUTBOX_KEPT);
+    Value count = code.get(grid.buffers, words + PIKOIR_APPEND_KEPT);
+    code.set(code.add(count, code.constant(1)), grid.buffers,
+             words + PIKOIR_APPEND_KEPT);
   });
 }
 
-Value piko::createLocalBins(OpBuilder &builder, Operation *op, const Grid &grid,
-                            int64_t outbox) {
+Value piko::createLocalBins(OpBuilder &builder, Operation *op,
+                            const GridContext &grid, int64_t buffer) {
   GridCode code(builder, op->getLoc());
   auto pointer = LLVM::LLVMPointerType::get(builder.getContext());
   Value input;
@@ -384,11 +387,11 @@ Value piko::createLocalBins(OpBuilder &builder, Operation *op, const Grid &grid,
     LLVM::StoreOp::create(builder, code.loc, value,
                           createOffset(builder, code.loc, input, offset));
   };
-  int64_t base = (outbox - 1) * PIKOIR_LOCAL_WORDS;
+  int64_t base = (buffer - 1) * PIKOIR_LOCAL_WORDS;
   store(code.get(grid.kept, base + PIKOIR_LOCAL_RECORDS),
         offsetof(pikoir_input, items));
   store(code.constant(0), offsetof(pikoir_input, order));
-  // Its members are read behind this.
+  // Its members are read after this.
   return createOffset(builder, code.loc, input, code.constant(0));
 }
 
@@ -399,8 +402,8 @@ struct FlushLowering : ContextPattern<FlushOp> {
   LogicalResult
   matchAndRewrite(FlushOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    Grid &grid = *context.grid(op);
-    BlockOutput output(rewriter, op, adaptor.getCells(), grid);
+    GridContext &grid = *context.grid(op);
+    BlockOutput output(rewriter, op, adaptor.getWords(), grid);
     output.publish();
     for (auto [i, edge] : llvm::enumerate(grid.locals))
       output.keep(i + 1, grid.recordBytes[i]);

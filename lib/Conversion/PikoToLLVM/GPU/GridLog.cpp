@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // The log of a grid, and memory of its blocks, on pikort/grid.h. A thread puts
-// entries into its outbox, which is one of its own; where that is full it takes
-// another piece of memory. BlockOutput.cpp is about what the block does.
+// entries into its append buffer, which is one of its own; where that is full
+// it takes another piece of memory. BlockOutput.cpp is about what the block
+// does.
 
 #include "PikoToLLVM/GPU/GridLog.h"
 
@@ -96,22 +97,22 @@ static Value pack(GridCode &code, int64_t low, int64_t high) {
       int64_t(uint64_t(uint32_t(low)) | (uint64_t(high) << 32)));
 }
 
-/// More memory for an outbox, with an entry of `size` bytes at its front: the
-/// entry's address, or that of memory that nobody reads. What comes first is
-/// for a record and where it goes, as most threads have no more, and taken by
-/// all lanes of a warp together: an atomic each would make them wait for each
-/// other.
-static Value extendOutbox(GridCode &code, Value log, Value words, int64_t base,
-                          int64_t size) {
+/// More memory for an append buffer, with an entry of `size` bytes at its
+/// front: the entry's address, or that of memory that nobody reads. What comes
+/// first is for a record and where it goes, as most threads have no more, and
+/// taken by all lanes of a warp together: an atomic each would make them wait
+/// for each other.
+static Value extendAppendBuffer(GridCode &code, Value log, Value words,
+                                int64_t base, int64_t size) {
   using P = GridCode::P;
   constexpr int64_t least = 512, others = 6 * layout::header;
   int64_t single = size + others + layout::header;
   Value zero = code.constant(0), header = code.constant(layout::header);
-  Value cursor = code.get(words, base + PIKOIR_OUTBOX_CURSOR);
+  Value cursor = code.get(words, base + PIKOIR_APPEND_CURSOR);
   Value isNew = code.compare(P::eq, cursor, zero);
   int64_t need = llvm::alignTo(
       std::max(least, layout::pieceHeader + size + layout::header), 64);
-  Value before = code.get(words, base + PIKOIR_OUTBOX_BYTES);
+  Value before = code.get(words, base + PIKOIR_APPEND_BYTES);
   Value more = arith::MaxUIOp::create(
       code.builder, code.loc, code.add(before, before), code.constant(need));
   Value pieceHeader = code.constant(layout::pieceHeader);
@@ -126,48 +127,49 @@ static Value extendOutbox(GridCode &code, Value log, Value words, int64_t base,
       code.compare(P::ne, first, zero),
       [&] {
         code.when(isNew,
-                  [&] { code.set(first, words, base + PIKOIR_OUTBOX_BEGIN); });
+                  [&] { code.set(first, words, base + PIKOIR_APPEND_BEGIN); });
         code.when(code.compare(P::ne, cursor, zero), [&] {
           code.store(pack(code, layout::header, PIKOIR_ENTRY_LINK), cursor);
           code.store(first, cursor, layout::number);
         });
         code.set(code.add(first, code.constant(size)), words,
-                 base + PIKOIR_OUTBOX_CURSOR);
+                 base + PIKOIR_APPEND_CURSOR);
         Value room = code.select(isNew, code.constant(single),
                                  code.sub(more, pieceHeader));
         code.set(code.sub(code.add(first, room), header), words,
-                 base + PIKOIR_OUTBOX_LIMIT);
+                 base + PIKOIR_APPEND_LIMIT);
         // Twice as much is a multiple of 64.
         code.set(
             code.select(isNew, code.constant(llvm::alignTo(single, 32)), more),
-            words, base + PIKOIR_OUTBOX_BYTES);
+            words, base + PIKOIR_APPEND_BYTES);
         return first;
       },
       [&] { return getSpare(code, log); });
 }
 
-Value piko::createEntry(OpBuilder &builder, Operation *op, const Grid &grid,
-                        EntryKind kind, int64_t number, int64_t bytes,
-                        int64_t stage, int64_t outbox) {
+Value piko::createEntry(OpBuilder &builder, Operation *op,
+                        const GridContext &grid, EntryKind kind, int64_t number,
+                        int64_t bytes, int64_t stage, int64_t buffer) {
   GridCode code(builder, op->getLoc());
   int64_t size = llvm::alignTo(layout::header + bytes, layout::header);
-  int64_t base = outbox * PIKOIR_OUTBOX_WORDS;
-  Value cursor = code.get(grid.outboxes, base + PIKOIR_OUTBOX_CURSOR);
+  int64_t base = buffer * PIKOIR_APPEND_WORDS;
+  Value cursor = code.get(grid.buffers, base + PIKOIR_APPEND_CURSOR);
   Value end = code.add(cursor, code.constant(size));
-  Value fits =
-      code.compare(GridCode::P::sle, end,
-                   code.get(grid.outboxes, base + PIKOIR_OUTBOX_LIMIT));
+  Value fits = code.compare(GridCode::P::sle, end,
+                            code.get(grid.buffers, base + PIKOIR_APPEND_LIMIT));
   Value entry = code.choose(
       fits,
       [&] {
-        code.set(end, grid.outboxes, base + PIKOIR_OUTBOX_CURSOR);
+        code.set(end, grid.buffers, base + PIKOIR_APPEND_CURSOR);
         return cursor;
       },
-      [&] { return extendOutbox(code, grid.log, grid.outboxes, base, size); });
+      [&] {
+        return extendAppendBuffer(code, grid.log, grid.buffers, base, size);
+      });
   code.store(pack(code, size, int64_t(kind)), entry);
   code.store(pack(code, number, stage), entry, layout::number);
-  if (outbox != 0)
-    code.set(entry, grid.outboxes, base + PIKOIR_OUTBOX_LAST);
+  if (buffer != 0)
+    code.set(entry, grid.buffers, base + PIKOIR_APPEND_LAST);
   return code.at(code.add(entry, code.constant(layout::header)));
 }
 
@@ -176,20 +178,21 @@ int64_t piko::getLogStage(Operation *op, Value log, LoweringContext &context) {
   return other ? context.stageNumber(op, other.getStage()) : -1;
 }
 
-int64_t piko::findOutbox(const Grid &grid, int64_t stage, int64_t port) {
+int64_t piko::findAppendBuffer(const GridContext &grid, int64_t stage,
+                               int64_t port) {
   for (auto [i, edge] : llvm::enumerate(grid.locals))
     if (edge == std::pair<int64_t, int64_t>(stage, port))
       return i + 1;
   return 0;
 }
 
-/// The words of an outbox for errors, of which there may have been none: their
-/// address, or 0 where there is no memory.
-static Value openErrorOutbox(GridCode &code, const Grid &grid) {
+/// The words of an append buffer for errors, of which there may have been none:
+/// their address, or 0 where there is no memory.
+static Value openErrorBuffer(GridCode &code, const GridContext &grid) {
   using P = GridCode::P;
   constexpr int64_t bytes =
-      llvm::alignTo(layout::pieceHeader + 8 * PIKOIR_OUTBOX_WORDS, 64);
-  Value known = code.get(grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+      llvm::alignTo(layout::pieceHeader + 8 * PIKOIR_APPEND_WORDS, 64);
+  Value known = code.get(grid.buffers, PIKOIR_APPEND_BEGIN);
   return code.choose(
       code.compare(P::ne, known, code.constant(0)), [&] { return known; },
       [&] {
@@ -199,9 +202,9 @@ static Value openErrorOutbox(GridCode &code, const Grid &grid) {
         Value isThere = code.compare(P::ne, piece, zero);
         Value words = code.add(piece, code.constant(layout::pieceHeader));
         code.when(isThere, [&] {
-          for (int64_t word = 0; word < PIKOIR_OUTBOX_WORDS; ++word)
+          for (int64_t word = 0; word < PIKOIR_APPEND_WORDS; ++word)
             code.store(zero, words, 8 * word);
-          code.set(words, grid.outboxes, PIKOIR_OUTBOX_BEGIN);
+          code.set(words, grid.buffers, PIKOIR_APPEND_BEGIN);
         });
         return code.select(isThere, words, zero);
       });
@@ -212,25 +215,25 @@ static Value viewWords(GridCode &code, Value address) {
   OpBuilder &builder = code.builder;
   auto bytesType = MemRefType::get({ShapedType::kDynamic}, builder.getI8Type());
   Value bytes = createBytes(builder, code.loc, code.at(address),
-                            code.constant(8 * PIKOIR_OUTBOX_WORDS), bytesType);
+                            code.constant(8 * PIKOIR_APPEND_WORDS), bytesType);
   return memref::ViewOp::create(
-      builder, code.loc, MemRefType::get({PIKOIR_OUTBOX_WORDS}, code.i64()),
+      builder, code.loc, MemRefType::get({PIKOIR_APPEND_WORDS}, code.i64()),
       bytes, code.index(0), ValueRange());
 }
 
 /// An entry for an error; its payload.
-static Value createErrorRoom(GridCode &code, Operation *op, const Grid &grid,
-                             int32_t place) {
+static Value createErrorRoom(GridCode &code, Operation *op,
+                             const GridContext &grid, int32_t place) {
   constexpr int64_t bytes = 4 * 8;
   if (!grid.forErrors)
     return createEntry(code.builder, op, grid, EntryKind::Error, place, bytes);
-  Value words = openErrorOutbox(code, grid);
+  Value words = openErrorBuffer(code, grid);
   Value isThere = code.compare(GridCode::P::ne, words, code.constant(0));
   return code.at(code.choose(
       isThere,
       [&]() -> Value {
-        Grid inLog = grid;
-        inLog.outboxes = viewWords(code, words);
+        GridContext inLog = grid;
+        inLog.buffers = viewWords(code, words);
         Value payload = createEntry(code.builder, op, inLog, EntryKind::Error,
                                     place, bytes);
         return LLVM::PtrToIntOp::create(code.builder, code.loc, code.i64(),
@@ -245,7 +248,7 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
                             Value bin, int32_t number,
                             ArrayRef<Value> numbers) {
   auto launch = op->getParentOfType<gpu::LaunchOp>();
-  Grid *grid = context.grid(op);
+  GridContext *grid = context.grid(op);
   // What is checked is told to the runtime while the grid runs, and so are its
   // errors: it knows which primitive they are about.
   PipelineOp pipeline = context.numbers(op).pipeline;
@@ -275,7 +278,7 @@ bool piko::createErrorEntry(OpBuilder &builder, Operation *op,
                                : createI64(builder, loc, -1)};
   llvm::append_range(words, numbers);
   words.resize(3, createI64(builder, loc, 0));
-  words.push_back(code.get(grid->outboxes, PIKOIR_OUTBOX_POSITION));
+  words.push_back(code.get(grid->buffers, PIKOIR_APPEND_POSITION));
   for (auto [i, word] : llvm::enumerate(words))
     LLVM::StoreOp::create(builder, loc, word,
                           createOffset(builder, loc, payload, 8 * i));
@@ -351,16 +354,16 @@ struct LogOfLowering : ContextPattern<LogOfOp> {
   }
 };
 
-struct OutboxesLowering : ContextPattern<OutboxesOp> {
+struct AppendBuffersLowering : ContextPattern<AppendBuffersOp> {
   using ContextPattern::ContextPattern;
   LogicalResult
-  matchAndRewrite(OutboxesOp op, OpAdaptor adaptor,
+  matchAndRewrite(AppendBuffersOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     auto function = op->getParentOfType<func::FuncOp>();
     int64_t head = function->getAttrOfType<IntegerAttr>(marks::number).getInt();
-    Grid grid;
+    GridContext grid;
     grid.log = adaptor.getLog();
-    grid.outboxes = adaptor.getState();
+    grid.buffers = adaptor.getState();
     grid.kept = adaptor.getKept();
     grid.forErrors = op.getForErrors();
     for (auto [i, port] :
@@ -481,9 +484,10 @@ struct BytesAtLowering : ContextPattern<BytesAtOp> {
 void piko::populateGridToLLVMPatterns(const TypeConverter &converter,
                                       RewritePatternSet &patterns,
                                       LoweringContext &context) {
-  patterns.add<OpenLogLowering, BlockCountLowering, CloseLogLowering,
-               LogOfLowering, OutboxesLowering, RestLowering, LeaveRestLowering,
-               TakeUnitsLowering, AllocateLowering, BytesAtLowering>(
-      converter, patterns.getContext(), context);
+  patterns
+      .add<OpenLogLowering, BlockCountLowering, CloseLogLowering, LogOfLowering,
+           AppendBuffersLowering, RestLowering, LeaveRestLowering,
+           TakeUnitsLowering, AllocateLowering, BytesAtLowering>(
+          converter, patterns.getContext(), context);
   populateBlockOutputPatterns(converter, patterns, context);
 }

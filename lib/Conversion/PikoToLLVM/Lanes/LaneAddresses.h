@@ -9,7 +9,7 @@
 
 namespace piko {
 
-/// Where lanes read or write: one address, from which on they lie one behind
+/// Where lanes read or write: one address, from which on they lie one after
 /// the other, or one for each.
 struct LaneAddresses {
   mlir::Value first, each;
@@ -21,8 +21,8 @@ mlir::Value computeLaneOffset(mlir::OpBuilder &builder, mlir::Location loc,
                               const StateView &view, mlir::ValueRange indices,
                               int64_t size, int64_t lanes);
 
-/// Of numbers of the type of `lanes`, so many bytes behind `base`; if that is
-/// one offset, each further lane is `stride` bytes behind the one before.
+/// Of numbers of the type of `lanes`, so many bytes after `base`; if that is
+/// one offset, each further lane is `stride` bytes after the one before.
 LaneAddresses createLaneAddresses(mlir::OpBuilder &builder, mlir::Location loc,
                                   mlir::Value base, mlir::Value offset,
                                   int64_t stride, mlir::VectorType lanes);

@@ -22,7 +22,7 @@ struct SharedIndex {
 
 /// Finds what an index of 32 bits, none of whose sums and products overflows,
 /// is a sum of; nothing if it is none such. Each lane's part of an address is
-/// then found once, in front of the loop that `user` is in. `lower` gives the
+/// then found once, before the loop that `user` is in. `lower` gives the
 /// value that a conversion has for another one.
 std::optional<SharedIndex>
 splitIndex(CodeBuilder at, mlir::Value index, mlir::Operation *user,

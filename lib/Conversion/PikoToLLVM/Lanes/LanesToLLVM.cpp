@@ -244,7 +244,7 @@ struct LaneItemsLowering : Lowering<LaneItemsOp> {
     return arith::ExtUIOp::create(builder, at.loc, words, numbers);
   }
 
-  /// Asks for primitives that lie behind those of the lanes: gathers of one
+  /// Asks for primitives that lie after those of the lanes: gathers of one
   /// field after the other are not foreseen as a stream.
   void prefetch(OpBuilder &builder, Location loc, Value items, Value position,
                 int64_t lanes, int64_t size) const {

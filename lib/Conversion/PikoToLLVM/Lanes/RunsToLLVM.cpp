@@ -73,13 +73,13 @@ private:
     SmallVector<Value> packed;
     for (auto [i, number] : llvm::enumerate(numbers)) {
       Value part = arith::ExtUIOp::create(builder, loc, wide, number);
-      int64_t behind = int64_t(i) * bits % together;
-      if (behind == 0) {
+      int64_t after = int64_t(i) * bits % together;
+      if (after == 0) {
         packed.push_back(part);
         continue;
       }
       Value distance = arith::ConstantOp::create(
-          builder, loc, builder.getIntegerAttr(wide, behind));
+          builder, loc, builder.getIntegerAttr(wide, after));
       part = arith::ShLIOp::create(builder, loc, part, distance);
       packed.back() = at.either(packed.back(), part);
     }
@@ -121,11 +121,11 @@ private:
     VectorType element = type.clone(builder.getIntegerType(bits));
     for (int64_t i = 0; i < count; ++i) {
       Value value = words[i / inWord];
-      if (int64_t behind = i % inWord * bits) {
+      if (int64_t after = i % inWord * bits) {
         Value distance = arith::ConstantOp::create(
             builder, loc,
             DenseElementsAttr::get(
-                word, builder.getIntegerAttr(word.getElementType(), behind)));
+                word, builder.getIntegerAttr(word.getElementType(), after)));
         value = arith::ShRUIOp::create(builder, loc, value, distance);
       }
       if (element != word)

@@ -70,7 +70,7 @@ private:
   void addQueues(KernelOp kernel);
   void addWaves(WavesOp waves);
   void addRounds(RoundsOp rounds);
-  /// What runs in front of each of the kernels that collect, and behind them.
+  /// What runs before each of the kernels that collect, and after them.
   void addSpread(RoundsOp rounds);
 
   ProgramOp program;

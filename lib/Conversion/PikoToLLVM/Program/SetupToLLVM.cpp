@@ -214,9 +214,9 @@ static_assert(int(ScheduleKind::LoadBalance) == PIKOIR_LOAD_BALANCE &&
 /// pikoir_stage_flags
 static int64_t stageFlags(StageOp stage) {
   ScheduleOp schedule = stage.getSchedule();
-  // Of a stage that runs behind another nothing shows where its lineage starts.
-  bool isBehind = schedule && schedule.getBehind();
-  return (stage.collects() || isBehind ? PIKOIR_COLLECTS : 0) |
+  // Of a stage that runs after another nothing shows where its lineage starts.
+  bool isAfter = schedule && schedule.getAfter();
+  return (stage.collects() || isAfter ? PIKOIR_COLLECTS : 0) |
          (stage.getSplit() ? PIKOIR_SPLIT : 0) |
          (stage.getPlaced() ? PIKOIR_PLACED : 0) |
          (schedule && schedule.getUnordered() ? PIKOIR_UNORDERED : 0) |
@@ -282,7 +282,7 @@ void SetupWriter::declareJoin(JoinOp join) {
           i32(*keeps)});
 }
 
-/// Lineages of the run count behind those of the sources; what one cycle emits
+/// Lineages of the run count after those of the sources; what one cycle emits
 /// is told apart by its launches.
 void SetupWriter::declareRoots(ProgramOp program) {
   if (!program.getRootsAttr())
@@ -358,8 +358,8 @@ void SetupWriter::declareRegion(Operation *region) {
 void SetupWriter::run(ProgramOp program) {
   call(PIKO_RUNTIME_FUNCTION(pikoir_declare_pipeline),
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
-  if (std::optional<int64_t> cells = pipeline.getMaxExtent())
-    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_max_extent), {i64(*cells)});
+  if (std::optional<int64_t> buckets = pipeline.getMaxExtent())
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_max_extent), {i64(*buckets)});
   for (auto [name, number] : numbers.records)
     declareRecord(name, number);
   for (auto check : pipeline.getOps<CheckRecordOp>())

@@ -46,7 +46,7 @@ public:
   LaneRecords(OpBuilder &builder, Location loc, LoweringContext &context,
               RecordOp record, ValueRange values);
   void store(int64_t lane, Value address);
-  /// All vectors, one behind the other.
+  /// All vectors, one after the other.
   void storeVectors(Value address);
 
 private:
@@ -213,14 +213,15 @@ private:
       return arith::IndexCastOp::create(builder, loc, words, lanes);
     };
     for (Value bin : adaptor.getBins())
-      emissions.cells.push_back(toWords(bin));
+      emissions.buckets.push_back(toWords(bin));
     if (!adaptor.getTiles().empty()) {
       CodeBuilder code(builder, loc);
       Value tiles = vector::BroadcastOp::create(
           builder, loc, words,
           createTileCount(builder, op, op.getStageAttr(), context));
-      for (auto [cell, tile] : llvm::zip(emissions.cells, adaptor.getTiles()))
-        cell = code.add(code.mul(cell, tiles), toWords(tile));
+      for (auto [bucket, tile] :
+           llvm::zip(emissions.buckets, adaptor.getTiles()))
+        bucket = code.add(code.mul(bucket, tiles), toWords(tile));
     }
     createPlaceLanes(builder, loc, context, adaptor.getWriter(), emissions,
                      isLocalEdge(op, op.getPort(), op.getStageAttr(), context));
@@ -236,7 +237,7 @@ Value createPointer(OpBuilder &builder, Location loc, Value memory) {
       toI64(builder, loc, address));
 }
 
-/// A vector of a piece of four lanes behind the other: lane i has its part in
+/// A vector of a piece of four lanes after the other: lane i has its part in
 /// vector i % 4, as that which follows those of i / 4 others.
 struct StoreRecordsLowering : Lowering<StoreRecordsOp> {
   using Lowering::Lowering;

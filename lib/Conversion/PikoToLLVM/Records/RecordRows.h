@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Words of records that lie one behind the other, one for each lane: vectors as
+// Words of records that lie one after the other, one for each lane: vectors as
 // wide as all lanes are loaded and de-interleaved, or interleaved and stored.
 
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_RECORDROWS_H

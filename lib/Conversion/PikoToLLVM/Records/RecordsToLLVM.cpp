@@ -90,7 +90,7 @@ private:
   Value shuffle(Value a, Value b, ArrayRef<int64_t> mask) {
     return vector::ShuffleOp::create(builder, loc, a, b, mask);
   }
-  /// The words of lanes i, i + 4, ..., one piece behind the other.
+  /// The words of lanes i, i + 4, ..., one piece after the other.
   Value join(ArrayRef<Value> parts);
   /// Word `i` of each lane's piece, for all i.
   std::array<Value, pieceWords> transpose(ArrayRef<Value> parts);

@@ -22,11 +22,13 @@ constexpr RuntimeMember cursor = PIKO_RUNTIME_MEMBER(pikoir_port, cursor),
                         size = PIKO_RUNTIME_MEMBER(pikoir_port, size),
                         emitted = PIKO_RUNTIME_MEMBER(pikoir_port, emitted),
                         kept = PIKO_RUNTIME_MEMBER(pikoir_port, kept),
-                        cellCursor =
-                            PIKO_RUNTIME_MEMBER(pikoir_port, cell_cursor),
-                        cellEnd = PIKO_RUNTIME_MEMBER(pikoir_port, cell_end),
-                        lastCell = PIKO_RUNTIME_MEMBER(pikoir_port, last_cell),
-                        cells = PIKO_RUNTIME_MEMBER(pikoir_port, cells),
+                        bucketCursor =
+                            PIKO_RUNTIME_MEMBER(pikoir_port, bucket_cursor),
+                        bucketEnd =
+                            PIKO_RUNTIME_MEMBER(pikoir_port, bucket_end),
+                        lastBucket =
+                            PIKO_RUNTIME_MEMBER(pikoir_port, last_bucket),
+                        buckets = PIKO_RUNTIME_MEMBER(pikoir_port, buckets),
                         run = PIKO_RUNTIME_MEMBER(pikoir_port, run),
                         portFlags = PIKO_RUNTIME_MEMBER(pikoir_port, flags);
 } // namespace layout
@@ -109,12 +111,12 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
   scf::YieldOp::create(builder, loc, room);
   builder.setInsertionPointToStart(path.elseBlock());
   out.increment(layout::emitted);
-  Value isPlaced = out.compare(MemberBuilder::P::ne, out.load(layout::cells),
+  Value isPlaced = out.compare(MemberBuilder::P::ne, out.load(layout::buckets),
                                createI64(builder, loc, 0));
   scf::IfOp::create(
       builder, loc, isPlaced,
       [&](OpBuilder &, Location) {
-        out.store(createI64(builder, loc, -1), layout::lastCell);
+        out.store(createI64(builder, loc, -1), layout::lastBucket);
         scf::YieldOp::create(builder, loc);
       },
       [&](OpBuilder &, Location) {
@@ -129,48 +131,48 @@ Value piko::createAppend(OpBuilder &builder, Location loc,
 /// Calls pikoir_place under a condition; what is written next is otherwise.
 static void callPlaceIf(Value isSlow, OpBuilder &builder, Location loc,
                         LoweringContext &context, Value writer, int64_t port,
-                        Value cell) {
+                        Value bucket) {
   auto path = scf::IfOp::create(builder, loc, isSlow, /*withElseRegion=*/true);
   builder.setInsertionPointToStart(path.thenBlock());
   context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_place),
-               {writer, createI32(builder, loc, port), cell});
+               {writer, createI32(builder, loc, port), bucket});
   builder.setInsertionPointToStart(path.elseBlock());
 }
 
 void piko::createLocalPlace(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer,
-                            int64_t port, Value cell) {
+                            int64_t port, Value bucket) {
   MemberBuilder out = openPort(builder, loc, context, writer, port);
-  Value last = out.load(layout::lastCell);
+  Value last = out.load(layout::lastBucket);
   Value isSlow = out.either(
       out.either(
-          out.compare(MemberBuilder::P::uge, cell, out.load(layout::cells)),
+          out.compare(MemberBuilder::P::uge, bucket, out.load(layout::buckets)),
           out.compare(MemberBuilder::P::ne, last, createI64(builder, loc, -1))),
       out.any(layout::portFlags, ~PIKOIR_PORT_LOCAL));
   OpBuilder::InsertionGuard guard(builder);
-  callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
+  callPlaceIf(isSlow, builder, loc, context, writer, port, bucket);
   Value cursor = out.load(layout::cursor);
   Value size = out.load(layout::size);
   out.store(createOffset(builder, loc, cursor, size), layout::cursor);
-  out.store(cell, layout::lastCell);
+  out.store(bucket, layout::lastBucket);
 }
 
 void piko::createPlace(OpBuilder &builder, Location loc,
                        LoweringContext &context, Value writer, int64_t port,
-                       Value cell) {
+                       Value bucket) {
   MemberBuilder out = openPort(builder, loc, context, writer, port);
-  Value last = out.load(layout::lastCell);
-  Value place = out.load(layout::cellCursor);
+  Value last = out.load(layout::lastBucket);
+  Value place = out.load(layout::bucketCursor);
   Value isSlow =
-      out.either(out.either(out.compare(MemberBuilder::P::sle, cell, last),
-                            out.compare(MemberBuilder::P::sge, cell,
-                                        out.load(layout::cells))),
+      out.either(out.either(out.compare(MemberBuilder::P::sle, bucket, last),
+                            out.compare(MemberBuilder::P::sge, bucket,
+                                        out.load(layout::buckets))),
                  out.either(out.comparePointers(LLVM::ICmpPredicate::eq, place,
-                                                out.load(layout::cellEnd)),
+                                                out.load(layout::bucketEnd)),
                             out.any(layout::portFlags, ~(PIKOIR_PORT_COUNTS |
                                                          PIKOIR_PORT_SOURCE))));
   OpBuilder::InsertionGuard guard(builder);
-  callPlaceIf(isSlow, builder, loc, context, writer, port, cell);
+  callPlaceIf(isSlow, builder, loc, context, writer, port, bucket);
   Value isFirst =
       out.compare(MemberBuilder::P::slt, last, createI64(builder, loc, 0));
   auto first = scf::IfOp::create(builder, loc, isFirst,
@@ -183,12 +185,12 @@ void piko::createPlace(OpBuilder &builder, Location loc,
   out.increment(layout::kept);
   builder.setInsertionPointAfter(first);
   Value mark =
-      out.select(isFirst, createI32(builder, loc, int64_t(PIKOIR_FIRST_CELL)),
+      out.select(isFirst, createI32(builder, loc, int64_t(PIKOIR_FIRST_BUCKET)),
                  createI32(builder, loc, 0));
-  Value entry = arith::TruncIOp::create(builder, loc, out.i32(), cell);
+  Value entry = arith::TruncIOp::create(builder, loc, out.i32(), bucket);
   createStore(builder, loc, out.either(entry, mark), place, out.tag);
-  out.store(createOffset(builder, loc, place, 4), layout::cellCursor);
-  out.store(cell, layout::lastCell);
+  out.store(createOffset(builder, loc, place, 4), layout::bucketCursor);
+  out.store(bucket, layout::lastBucket);
 }
 
 Value piko::createReserve(OpBuilder &builder, Location loc,
@@ -227,7 +229,7 @@ void piko::createAppendLanes(OpBuilder &builder, Location loc,
   // Records that are put nowhere are not kept.
   Value zero = createI64(builder, loc, 0);
   Value isKept =
-      out.compare(MemberBuilder::P::eq, out.load(layout::cells), zero);
+      out.compare(MemberBuilder::P::eq, out.load(layout::buckets), zero);
   Value bytes =
       out.mul(out.select(isKept, count, zero), out.load(layout::size));
   out.store(createOffset(builder, loc, out.load(layout::cursor), bytes),
@@ -243,31 +245,32 @@ static void createPlaceEach(OpBuilder &builder, Location loc,
   out.forEach(
       out.index(0), out.index(emissions.lanes), out.index(1), [&](Value lane) {
         Value shift = toI64(builder, loc, lane);
-        for (auto [bits, cells] : llvm::zip(emissions.bits, emissions.cells)) {
+        for (auto [bits, buckets] :
+             llvm::zip(emissions.bits, emissions.buckets)) {
           Value rest = arith::ShRUIOp::create(builder, loc, bits, shift);
           Value bit = out.both(rest, createI64(builder, loc, 1));
           out.when(out.compare(MemberBuilder::P::ne, bit, zero), [&] {
             out.increment(layout::emitted);
-            out.store(createI64(builder, loc, -1), layout::lastCell);
+            out.store(createI64(builder, loc, -1), layout::lastBucket);
             context.call(
                 builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_place),
                 {writer, createI32(builder, loc, emissions.port),
-                 vector::ExtractOp::create(builder, loc, cells, lane)});
+                 vector::ExtractOp::create(builder, loc, buckets, lane)});
           });
         }
       });
 }
 
-/// Whether there is a cell that a lane in the mask names and that is none.
+/// Whether there is a bucket that a lane in the mask names and that is none.
 static Value createIsOutside(MemberBuilder &out, const LaneEmissions &emissions,
-                             Value cellCount) {
-  auto words = cast<VectorType>(emissions.cells.front().getType());
+                             Value bucketCount) {
+  auto words = cast<VectorType>(emissions.buckets.front().getType());
   Value most =
-      vector::BroadcastOp::create(out.builder, out.loc, words, cellCount);
+      vector::BroadcastOp::create(out.builder, out.loc, words, bucketCount);
   Value outside;
-  for (auto [bits, cells] : llvm::zip(emissions.bits, emissions.cells)) {
+  for (auto [bits, buckets] : llvm::zip(emissions.bits, emissions.buckets)) {
     Value bad = createBits(out.builder, out.loc,
-                           out.compare(MemberBuilder::P::uge, cells, most));
+                           out.compare(MemberBuilder::P::uge, buckets, most));
     bad = out.both(bad, bits);
     outside = outside ? out.either(outside, bad) : bad;
   }
@@ -275,44 +278,44 @@ static Value createIsOutside(MemberBuilder &out, const LaneEmissions &emissions,
                      createI64(out.builder, out.loc, 0));
 }
 
-/// Notes the cells of the lanes one behind the other, each as the first of its
+/// Notes the buckets of the lanes one after the other, each as the first of its
 /// record. A lane that is not in the mask leaves its own to be written over.
-static void noteCells(MemberBuilder &out, const LaneEmissions &emissions) {
+static void noteBuckets(MemberBuilder &out, const LaneEmissions &emissions) {
   OpBuilder &builder = out.builder;
   Location loc = out.loc;
   Type entries = VectorType::get({emissions.lanes}, out.i32());
   Value first = vector::BroadcastOp::create(
       builder, loc, entries,
-      createI32(builder, loc, int64_t(PIKOIR_FIRST_CELL)));
+      createI32(builder, loc, int64_t(PIKOIR_FIRST_BUCKET)));
   SmallVector<Value> noted;
-  for (Value cells : emissions.cells)
+  for (Value buckets : emissions.buckets)
     noted.push_back(out.either(
-        arith::TruncIOp::create(builder, loc, entries, cells), first));
-  Value place = out.load(layout::cellCursor);
+        arith::TruncIOp::create(builder, loc, entries, buckets), first));
+  Value place = out.load(layout::bucketCursor);
   for (int64_t lane = 0; lane < emissions.lanes; ++lane)
-    for (auto [bits, cells] : llvm::zip(emissions.bits, noted)) {
+    for (auto [bits, buckets] : llvm::zip(emissions.bits, noted)) {
       createStore(builder, loc,
-                  vector::ExtractOp::create(builder, loc, cells, lane), place,
+                  vector::ExtractOp::create(builder, loc, buckets, lane), place,
                   out.tag);
       place = createOffset(
           builder, loc, place,
           createLaneOffset(builder, loc, bits, lane, sizeof(uint32_t)));
     }
-  out.store(place, layout::cellCursor);
+  out.store(place, layout::bucketCursor);
 }
 
 void piko::createPlaceLanes(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer,
                             const LaneEmissions &emissions, bool isLocal) {
   MemberBuilder out = openPort(builder, loc, context, writer, emissions.port);
-  Value isSlow = createIsOutside(out, emissions, out.load(layout::cells));
+  Value isSlow = createIsOutside(out, emissions, out.load(layout::buckets));
   if (!isLocal) {
     auto bytes = int64_t(sizeof(uint32_t)) * emissions.lanes *
                  int64_t(emissions.bits.size());
     Value room = out.comparePointers(
         LLVM::ICmpPredicate::ugt,
-        createOffset(builder, loc, out.load(layout::cellCursor), bytes),
-        out.load(layout::cellEnd));
+        createOffset(builder, loc, out.load(layout::bucketCursor), bytes),
+        out.load(layout::bucketEnd));
     isSlow = out.either(isSlow, room);
   }
   isSlow = out.either(
@@ -330,7 +333,7 @@ void piko::createPlaceLanes(OpBuilder &builder, Location loc,
   if (isLocal)
     return;
   out.store(out.add(out.load(layout::kept), count), layout::kept);
-  noteCells(out, emissions);
+  noteBuckets(out, emissions);
 }
 
 Value piko::createIsCounted(OpBuilder &builder, Location loc,
@@ -343,7 +346,7 @@ void piko::createSourceNext(OpBuilder &builder, Location loc,
                             LoweringContext &context, Value writer) {
   MemberBuilder out = openPort(builder, loc, context, writer, /*port=*/0);
   Value isNowhere =
-      out.compare(MemberBuilder::P::slt, out.load(layout::lastCell),
+      out.compare(MemberBuilder::P::slt, out.load(layout::lastBucket),
                   createI64(builder, loc, 0));
   scf::IfOp::create(
       builder, loc, isNowhere,
@@ -352,7 +355,7 @@ void piko::createSourceNext(OpBuilder &builder, Location loc,
         scf::YieldOp::create(builder, loc);
       },
       [&](OpBuilder &, Location) {
-        out.store(createI64(builder, loc, -1), layout::lastCell);
+        out.store(createI64(builder, loc, -1), layout::lastBucket);
         scf::YieldOp::create(builder, loc);
       });
 }

@@ -18,28 +18,28 @@ mlir::Value createTakesVectors(mlir::OpBuilder &builder, mlir::Location loc,
 mlir::Value createAppend(mlir::OpBuilder &builder, mlir::Location loc,
                          LoweringContext &context, mlir::Value writer,
                          int64_t port);
-/// Puts a port's latest record into a cell, an i64 (pikoir_place).
+/// Puts a port's latest record into a bucket, an i64 (pikoir_place).
 void createPlace(mlir::OpBuilder &builder, mlir::Location loc,
                  LoweringContext &context, mlir::Value writer, int64_t port,
-                 mlir::Value cell);
+                 mlir::Value bucket);
 /// The same where the port's edge is local.
 void createLocalPlace(mlir::OpBuilder &builder, mlir::Location loc,
                       LoweringContext &context, mlir::Value writer,
-                      int64_t port, mlir::Value cell);
+                      int64_t port, mlir::Value bucket);
 /// Where so many records of a port may be written (pikoir_reserve).
 mlir::Value createReserve(mlir::OpBuilder &builder, mlir::Location loc,
                           LoweringContext &context, mlir::Value writer,
                           int64_t port, int64_t count);
-/// What lanes emit to a port: a bit for each in an i64, and the cells.
+/// What lanes emit to a port: a bit for each in an i64, and the buckets.
 struct LaneEmissions {
   int64_t port, lanes;
-  llvm::SmallVector<mlir::Value> bits, cells;
+  llvm::SmallVector<mlir::Value> bits, buckets;
 };
-/// pikoir_append for each of the records that are written behind one another.
+/// pikoir_append for each of the records that are written after one another.
 void createAppendLanes(mlir::OpBuilder &builder, mlir::Location loc,
                        LoweringContext &context, mlir::Value writer,
                        const LaneEmissions &emissions);
-/// The same where each is put into a cell.
+/// The same where each is put into a bucket.
 void createPlaceLanes(mlir::OpBuilder &builder, mlir::Location loc,
                       LoweringContext &context, mlir::Value writer,
                       const LaneEmissions &emissions, bool isLocal);

@@ -33,7 +33,7 @@ Value piko::createTileCount(OpBuilder &builder, Operation *op,
   for (int64_t dim = 0, e = context.stage(op, stage).getBins().size(); dim < e;
        ++dim) {
     Value size = context.query(
-        builder, op, PIKO_RUNTIME_FUNCTION(pikoir_cell_grid), number, dim);
+        builder, op, PIKO_RUNTIME_FUNCTION(pikoir_tile_grid), number, dim);
     count = count ? arith::MulIOp::create(builder, op->getLoc(), count, size)
                         .getResult()
                   : size;
@@ -82,10 +82,10 @@ struct LocalBinLowering : Lowering<LocalBinOp> {
   matchAndRewrite(LocalBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    if (Grid *grid = context.grid(op)) {
+    if (GridContext *grid = context.grid(op)) {
       int64_t stage = getLogStage(op, op.getSource(), context);
-      Value bins = createLocalBins(rewriter, op, *grid,
-                                   findOutbox(*grid, stage, op.getPort()));
+      Value bins = createLocalBins(
+          rewriter, op, *grid, findAppendBuffer(*grid, stage, op.getPort()));
       rewriter.inlineBlockBefore(op.getBodyBlock(), op, bins);
       rewriter.eraseOp(op);
       return success();
@@ -117,14 +117,15 @@ struct WriterCallLowering : Lowering<OpT> {
   }
 };
 constexpr RuntimeFunction closeWriter = PIKO_RUNTIME_FUNCTION(pikoir_close);
-constexpr RuntimeFunction deferEnd = PIKO_RUNTIME_FUNCTION(pikoir_defer_end);
+constexpr RuntimeFunction reorderEnd =
+    PIKO_RUNTIME_FUNCTION(pikoir_reorder_end);
 
 struct NextLowering : Lowering<NextOp> {
   using Lowering::Lowering;
   LogicalResult
   matchAndRewrite(NextOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    if (Grid *grid = context.grid(op))
+    if (GridContext *grid = context.grid(op))
       createEntry(rewriter, op, *grid, EntryKind::Next, /*number=*/0,
                   /*bytes=*/0, getLogStage(op, op.getWriter(), context));
     else if (op->getParentOfType<func::FuncOp>()->hasAttr(marks::source))
@@ -161,10 +162,10 @@ struct WriterNumberLowering : Lowering<OpT> {
     return success();
   }
 };
-constexpr RuntimeFunction deferBegin =
-    PIKO_RUNTIME_FUNCTION(pikoir_defer_begin);
-constexpr RuntimeFunction deferIteration =
-    PIKO_RUNTIME_FUNCTION(pikoir_defer_iteration);
+constexpr RuntimeFunction reorderBegin =
+    PIKO_RUNTIME_FUNCTION(pikoir_reorder_begin);
+constexpr RuntimeFunction reorderIteration =
+    PIKO_RUNTIME_FUNCTION(pikoir_reorder_iteration);
 constexpr RuntimeFunction scratchRelease =
     PIKO_RUNTIME_FUNCTION(pikoir_scratch_release);
 
@@ -212,13 +213,13 @@ struct AppendLowering : Lowering<AppendOp> {
     RecordOp record = context.record(op.getPrim().getType().getRecord());
     int64_t port = op.getPort();
     Value room;
-    if (Grid *grid = context.grid(op)) {
+    if (GridContext *grid = context.grid(op)) {
       int64_t stage = getLogStage(op, op.getWriter(), context);
-      int64_t outbox = findOutbox(*grid, stage, port);
+      int64_t buffer = findAppendBuffer(*grid, stage, port);
       room = createEntry(rewriter, op, *grid, EntryKind::Record, port,
-                         record.getSize(), stage, outbox);
-      if (outbox && !grid->placed[outbox - 1])
-        createKeep(rewriter, loc, *grid, outbox);
+                         record.getSize(), stage, buffer);
+      if (buffer && !grid->placed[buffer - 1])
+        createKeep(rewriter, loc, *grid, buffer);
     } else {
       room = createAppend(rewriter, loc, context, adaptor.getWriter(), port);
     }
@@ -241,30 +242,30 @@ struct PlaceLowering : Lowering<AppendBinOp> {
   matchAndRewrite(AppendBinOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
     Location loc = op.getLoc();
-    Value cell = toI64(rewriter, loc, adaptor.getBin());
+    Value bucket = toI64(rewriter, loc, adaptor.getBin());
     if (adaptor.getTile()) {
       Value tiles = createTileCount(rewriter, op, op.getStageAttr(), context);
-      cell = arith::AddIOp::create(
-          rewriter, loc, arith::MulIOp::create(rewriter, loc, cell, tiles),
+      bucket = arith::AddIOp::create(
+          rewriter, loc, arith::MulIOp::create(rewriter, loc, bucket, tiles),
           toI64(rewriter, loc, adaptor.getTile()));
     }
-    if (Grid *grid = context.grid(op)) {
+    if (GridContext *grid = context.grid(op)) {
       int64_t port = op.getPort().value_or(0);
       int64_t from = getLogStage(op, op.getWriter(), context);
-      if (int64_t outbox = findOutbox(*grid, from, port)) {
-        createKeep(rewriter, loc, *grid, outbox);
+      if (int64_t buffer = findAppendBuffer(*grid, from, port)) {
+        createKeep(rewriter, loc, *grid, buffer);
       } else {
-        Value entry = createEntry(rewriter, op, *grid, EntryKind::Cell, port,
+        Value entry = createEntry(rewriter, op, *grid, EntryKind::Bucket, port,
                                   /*bytes=*/8, from);
-        LLVM::StoreOp::create(rewriter, loc, cell, entry);
+        LLVM::StoreOp::create(rewriter, loc, bucket, entry);
       }
     } else if (op.getPort() &&
                isLocalEdge(op, *op.getPort(), op.getStageAttr(), context))
       createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
-                       *op.getPort(), cell);
-    else // a source's cells are those of its only port
+                       *op.getPort(), bucket);
+    else // a source's buckets are those of its only port
       createPlace(rewriter, loc, context, adaptor.getWriter(),
-                  op.getPort().value_or(0), cell);
+                  op.getPort().value_or(0), bucket);
     rewriter.eraseOp(op);
     return success();
   }
@@ -278,9 +279,9 @@ void piko::populateWriterToLLVMPatterns(const TypeConverter &converter,
   patterns
       .add<OpenWriterLowering, TakesVectorsLowering, LocalBinLowering,
            WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
-           IsCountedLowering, WriterCallLowering<DeferEndOp, deferEnd>,
-           WriterNumberLowering<DeferBeginOp, deferBegin>,
-           WriterNumberLowering<DeferIterationOp, deferIteration>,
+           IsCountedLowering, WriterCallLowering<ReorderEndOp, reorderEnd>,
+           WriterNumberLowering<ReorderBeginOp, reorderBegin>,
+           WriterNumberLowering<ReorderIterationOp, reorderIteration>,
            WriterNumberLowering<ScratchReleaseOp, scratchRelease>,
            ScratchMarkLowering, ScratchLowering, AppendLowering, PlaceLowering>(
           converter, patterns.getContext(), context);

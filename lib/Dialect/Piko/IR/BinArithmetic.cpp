@@ -190,7 +190,7 @@ Value BinArithmetic::isInState(StringRef state, ValueRange indices) {
 Value piko::findBin(OpBuilder &builder, Operation *op) {
   for (auto loop = op->getParentOfType<scf::ForOp>(); loop;
        loop = loop->getParentOfType<scf::ForOp>()) {
-    auto cells = loop.getLowerBound().getDefiningOp<UnitCellsOp>();
+    auto cells = loop.getLowerBound().getDefiningOp<UnitBucketsOp>();
     if (!cells)
       continue;
     auto bins = cells.getBins().getDefiningOp<OpenBinsOp>();
@@ -203,7 +203,7 @@ Value piko::findBin(OpBuilder &builder, Operation *op) {
     Value cell = loop.getInductionVar();
     if (stage.getTakesList())
       return CallBinOp::create(builder, op->getLoc(), bins, cell);
-    return CellBinOp::create(builder, op->getLoc(), bins, cell);
+    return BucketBinOp::create(builder, op->getLoc(), bins, cell);
   }
   return {};
 }

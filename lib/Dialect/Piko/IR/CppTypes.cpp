@@ -52,7 +52,7 @@ static int64_t parseExtents(StringRef text) {
   return parts.size() == 1 ? -product : product;
 }
 
-/// `vec<3, int8_t>`, behind the namespace.
+/// `vec<3, int8_t>`, after the namespace.
 static std::optional<GlmType> parseGlmTemplate(StringRef name) {
   auto [kind, rest] = name.split('<');
   SmallVector<StringRef, 4> arguments;

@@ -81,7 +81,7 @@ void PikoDialect::initialize() {
 static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
       .Cases({marks::lanes, marks::rows, marks::shared, marks::disjoint,
-              marks::again, marks::deferred, marks::rare, marks::fails,
+              marks::again, marks::reordered, marks::rare, marks::fails,
               marks::input, marks::shortCircuit, marks::inside, marks::source,
               marks::versions},
              "a unit")
@@ -91,7 +91,7 @@ static StringRef getExpectedKind(StringRef name) {
       .Case(marks::steps, "an array of steps, such as #piko.step<clear 0>")
       .Cases({marks::number, marks::blockSize, marks::fewest},
              "a 64-bit integer")
-      .Cases({marks::turns, marks::advances, marks::probability},
+      .Cases({marks::iterations, marks::advances, marks::probability},
              "a 64-bit float")
       .Case(marks::probabilities, "an array of 64-bit floats")
       .Cases({marks::pixels, cppNameAttr}, "a string")
@@ -116,7 +116,7 @@ static bool hasExpectedKind(NamedAttribute attribute) {
     return isa<StringAttr>(value);
   if (name == cppTypesAttr)
     return isa<DictionaryAttr>(value);
-  if (name == marks::turns || name == marks::advances ||
+  if (name == marks::iterations || name == marks::advances ||
       name == marks::probability)
     return isa<FloatAttr>(value) && cast<FloatAttr>(value).getType().isF64();
   if (name == marks::number || name == marks::blockSize ||

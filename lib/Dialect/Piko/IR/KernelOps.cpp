@@ -15,7 +15,7 @@ ProcessOp KernelOp::getProcess() {
   return {};
 }
 
-/// Each process phase but the first stands behind a barrier that names it.
+/// Each process phase but the first stands after a barrier that names it.
 static LogicalResult verifyBarriers(KernelOp kernel) {
   llvm::SmallDenseSet<Attribute> before;
   for (Operation &op : *kernel.getBodyBlock()) {
@@ -24,7 +24,7 @@ static LogicalResult verifyBarriers(KernelOp kernel) {
       if (!before.empty() &&
           (!barrier || barrier.getConsumerAttr() != process.getStageAttr()))
         return process.emitOpError("expected to be the first of its kernel, or "
-                                   "behind a local barrier that names ")
+                                   "after a local barrier that names ")
                << process.getStageAttr();
       if (!before.insert(process.getStageAttr()).second)
         return process.emitOpError("expected one process phase of ")
@@ -35,9 +35,9 @@ static LogicalResult verifyBarriers(KernelOp kernel) {
       continue;
     if (!before.contains(barrier.getProducerAttr()))
       return barrier.emitOpError("expected the process phase of ")
-             << barrier.getProducerAttr() << " in front of it";
+             << barrier.getProducerAttr() << " before it";
     if (!isa_and_nonnull<ProcessOp>(op.getNextNode()))
-      return barrier.emitOpError("expected to stand in front of a process "
+      return barrier.emitOpError("expected to stand before a process "
                                  "phase");
   }
   return success();
@@ -62,7 +62,7 @@ static LogicalResult verifyLevel(KernelOp kernel) {
   if (!work)
     return success();
   WalkResult result = kernel.walk([](Operation *op) {
-    if (!op->hasTrait<CPUOnly>())
+    if (!op->hasTrait<TargetLevel>())
       return WalkResult::advance();
     op->emitOpError(
         "expected no operation of the CPU in a kernel of the machine "
@@ -141,7 +141,7 @@ LogicalResult piko::verifyLocalEdge(Operation *op, FlatSymbolRefAttr from,
              << "[" << producer.getBins() << "] and [" << consumer.getBins()
              << "]";
     ScheduleOp schedule = consumer.getSchedule();
-    if (!consumer.collects() && !(schedule && schedule.getBehind()))
+    if (!consumer.collects() && !(schedule && schedule.getAfter()))
       return op->emitOpError("expected a stage that waits for its bin, but ")
              << to << " does not";
     return success();

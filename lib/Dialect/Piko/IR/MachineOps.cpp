@@ -35,17 +35,16 @@ LogicalResult BinsOp::verifyRegions() {
       return work->emitOpError("expected to take what the bins of ")
              << getStageAttr() << " hold, because it is the first work on them";
     if (!before.empty() && !producer)
-      return work->emitOpError("expected to take what work in front of it "
+      return work->emitOpError("expected to take what work before it "
                                "emits, because it is not the first");
     if (producer && !before.contains(producer))
-      return work->emitOpError("expected work of ")
-             << producer << " in front of it";
+      return work->emitOpError("expected work of ") << producer << " before it";
     if (work->hasAttr(marks::again)) {
       auto next = dyn_cast_or_null<WorkOpInterface>(work->getNextNode());
       if (!producer || !next || next.getStageAttr() != stage ||
           next.getProducerAttr() != producer ||
           next.getPortAttr() != work.getPortAttr())
-        return work->emitOpError("expected work that takes the same behind it");
+        return work->emitOpError("expected work that takes the same after it");
       continue;
     }
     if (!before.insert(stage).second)

@@ -1,4 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// What lanes share stays scalar, also what loops hand on, where all lanes that
+// are still in the loop began with the same, such as the place of an insertion.
+// The rest becomes vectors:
+//
+//   * access to state and to primitives becomes gathers and scatters, or masked
+//     loads and stores of rows;
+//   * a local array has a column for each lane, and one of up to 16 elements is
+//     accessed row by row, also where lanes are in different places;
+//   * a side of a condition gets no branch around it if it is short, and in
+//     strips of convex shapes (piko-narrow-integers) up to 64 instructions;
+//   * an inner loop, or two of which one is all that the other does, is
+//     collapsed where lanes make different numbers of iterations, which hand on
+//     nothing and change state by atomic operations alone.
+//
+// Barriers need no code: lanes come to them together. Where they may not, or
+// where what comes before one keeps the order of iterations, a loop is refused.
 
 #include "Vectorize/Analysis/IterationLanes.h"
 
@@ -28,12 +45,12 @@ bool piko::isOneVector(scf::ForOp loop, int64_t laneCount) {
   if (!least)
     return false;
   return llvm::any_of(least->getOperands(), [&](Value bound) {
-    auto behind = bound.getDefiningOp<arith::AddIOp>();
+    auto after = bound.getDefiningOp<arith::AddIOp>();
     std::optional<int64_t> width =
-        behind ? getConstantIntValue(behind.getRhs()) : std::nullopt;
+        after ? getConstantIntValue(after.getRhs()) : std::nullopt;
     return width && *width <= laneCount &&
-           behind.getLhs() == loop.getLowerBound() &&
-           bitEnumContainsAll(behind.getOverflowFlags(),
+           after.getLhs() == loop.getLowerBound() &&
+           bitEnumContainsAll(after.getOverflowFlags(),
                               arith::IntegerOverflowFlags::nsw);
   });
 }
@@ -72,8 +89,9 @@ IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
       written.insert(access.getAccessedState());
   });
   analyze();
-  // What is computed of an array is another way then, and may have other turns.
-  while (splitArraysOfTurns()) {
+  // What is computed of an array is another way then, and may have other
+  // iterations.
+  while (splitArraysOfIterations()) {
     uniformity = Uniformity(loop, roots, /*isLockstep=*/true);
     analyze();
   }
@@ -107,7 +125,7 @@ void IterationLanes::analyze() {
 
 /// Where lanes take turns to change an array, each has a column, though it does
 /// the same as the others.
-bool IterationLanes::splitArraysOfTurns() {
+bool IterationLanes::splitArraysOfIterations() {
   size_t known = roots.size();
   llvm::DenseSet<Value> found;
   for (const OrderedGroup &group : groups)
@@ -139,7 +157,7 @@ void IterationLanes::findArrays() {
       }
       if (!isSimple)
         refuse(op, "lanes cannot share this array");
-      // A turn keeps one for each lane.
+      // An iteration keeps one for each lane.
       constexpr int64_t most = 16 << 10;
       Type element = type.getElementType();
       bytes += isSimple && isVarying(array)
@@ -199,7 +217,7 @@ bool IterationLanes::isSum(Value value) const {
   return (isSum(a) && !isVarying(b)) || (isSum(b) && !isVarying(a));
 }
 
-/// Whether a linear value is the same in all turns of inner loops.
+/// Whether a linear value is the same in all iterations of inner loops.
 bool IterationLanes::isFixed(Value value) const {
   if (value == loop.getInductionVar())
     return true;
@@ -215,7 +233,7 @@ bool IterationLanes::isFixed(Value value) const {
 
 /// Updates of one pixel keep their order: lanes must not meet there, neither in
 /// one operation nor in two. Where they cannot, all access to the image has the
-/// same index that differs from lane to lane, in all turns of inner loops.
+/// same index that differs from lane to lane, in all iterations of inner loops.
 void IterationLanes::findSharedPixels() {
   llvm::DenseMap<Attribute, SmallVector<Value>> apart; // by dimension, or null
   loop.walk([&](Operation *op) {
@@ -336,7 +354,7 @@ void IterationLanes::checkBarriers() {
 // Nests
 //===----------------------------------------------------------------------===//
 
-/// Whether the turns of a loop may change places, also with those of other
+/// Whether the iterations of a loop may change places, also with those of other
 /// lanes: they hand on nothing, and change each piece of state by atomic
 /// operations of one kind alone.
 bool IterationLanes::canCollapse(scf::ForOp inner) const {
@@ -528,7 +546,7 @@ void IterationLanes::checkCarried() {
   });
 }
 
-/// Whether all accesses to a row of lanes' elements are one behind the other.
+/// Whether all accesses to a row of lanes' elements are one after the other.
 bool IterationLanes::isRow(Operation *op) const {
   if (auto load = dyn_cast<memref::LoadOp>(op))
     return isPrivate(load.getMemRef()) ? !isVarying(load.getIndices()[0])
@@ -559,7 +577,7 @@ bool IterationLanes::isPrivateRow(Operation *op) const {
                        [&](Value element) { return isVarying(element); });
 }
 
-std::optional<int64_t> piko::getConstantTurns(scf::ForOp loop) {
+std::optional<int64_t> piko::getConstantIterations(scf::ForOp loop) {
   if (std::optional<APInt> count = loop.getStaticTripCount())
     return count->getLimitedValue();
   auto strip = [](Value value) {

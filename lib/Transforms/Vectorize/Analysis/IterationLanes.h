@@ -35,10 +35,10 @@ enum class LaneForm {
 };
 
 /// Operations of a block that run lane by lane, in the order of iterations: in
-/// their place, or, `deferred`, behind all that vectors do.
+/// their place, or, `late`, after all that vectors do.
 struct OrderedGroup {
   mlir::Operation *first = nullptr, *last = nullptr;
-  bool deferred = false;
+  bool late = false;
 
   explicit operator bool() const { return first; }
   bool contains(mlir::Operation *op) const;
@@ -93,12 +93,13 @@ public:
   Cost getCost() const;
   /// The same by other constants.
   Cost getCost(const Cycles &cycles) const;
-  /// How many turns each lane makes of a loop that lanes leave at different
-  /// times, as far as is known.
-  double getOwnTurns(mlir::Operation *inner) const;
-  /// How many turns all lanes together make of a loop that is made of these
-  /// two, as far as is known.
-  double getFlatTurns(mlir::Operation *outer, mlir::Operation *inner) const;
+  /// How many iterations each lane makes of a loop that lanes leave at
+  /// different times, as far as is known.
+  double getOwnIterations(mlir::Operation *inner) const;
+  /// How many iterations all lanes together make of a loop that is made of
+  /// these two, as far as is known.
+  double getFlatIterations(mlir::Operation *outer,
+                           mlir::Operation *inner) const;
 
   mlir::scf::ForOp getLoop() const { return loop; }
   /// How many iterations run at once.
@@ -120,10 +121,10 @@ public:
   /// Whether an operation reads an array, or state, that no iteration changes.
   bool readsFixed(mlir::Operation *op) const;
   LaneForm getForm(mlir::Operation *op) const;
-  /// Whether all lanes make the same turns of an inner loop.
+  /// Whether all lanes make the same iterations of an inner loop.
   bool isSharedLoop(mlir::Operation *op) const;
-  /// The loops, from the outermost, whose turns fill vectors together with the
-  /// lanes that make them; none if `loop` is not the first of such.
+  /// The loops, from the outermost, whose iterations fill vectors together with
+  /// the lanes that make them; none if `loop` is not the first of such.
   llvm::SmallVector<mlir::scf::ForOp> getNest(mlir::scf::ForOp loop) const {
     return nests.lookup(loop);
   }
@@ -132,7 +133,7 @@ public:
   llvm::ArrayRef<OrderedGroup> getGroups() const { return groups; }
   /// The group that an operation is in, or null.
   const OrderedGroup *findGroup(mlir::Operation *op) const;
-  /// What of these operations of a block may be done in front of the others, in
+  /// What of these operations of a block may be done before the others, in
   /// vectors.
   llvm::SetVector<mlir::Operation *>
   findMovable(llvm::ArrayRef<mlir::Operation *> ops) const;
@@ -145,7 +146,7 @@ public:
   llvm::StringRef explainTurns(mlir::Operation *emission) const;
   /// Whether vectors store the records that lanes emit in their turns.
   bool isStoredByVectors(AppendOp append) const;
-  /// Whether lanes access one element behind the other.
+  /// Whether lanes access one element after the other.
   bool isRow(mlir::Operation *op) const;
   /// Whether an operation changes elements side by side of a private copy.
   bool isPrivateRow(mlir::Operation *op) const;
@@ -160,7 +161,7 @@ private:
   }
   void analyze();
   /// Whether there were any.
-  bool splitArraysOfTurns();
+  bool splitArraysOfIterations();
   void findNests();
   bool canCollapse(mlir::scf::ForOp inner) const;
   void findArrays();
@@ -180,9 +181,9 @@ private:
   /// Groups of operations that keep their order among one another.
   llvm::SmallVector<OrderedGroup>
   makeGroups(llvm::ArrayRef<mlir::Operation *> ops) const;
-  /// Whether groups may run behind all others.
-  bool canDefer(llvm::ArrayRef<OrderedGroup> groups) const;
-  bool canDefer(const OrderedGroup &group,
+  /// Whether groups may run after all others.
+  bool canDelay(llvm::ArrayRef<OrderedGroup> groups) const;
+  bool canDelay(const OrderedGroup &group,
                 const llvm::SetVector<mlir::Operation *> &rest) const;
   bool isMovable(mlir::Operation *op) const;
   bool addEmission(mlir::Operation *op, PortEmissions &port) const;
@@ -209,8 +210,9 @@ private:
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
 
-/// How often a loop turns each time, if that is known, but for sums that wrap.
-std::optional<int64_t> getConstantTurns(mlir::scf::ForOp loop);
+/// How often a loop iterates each time, if that is known, but for sums that
+/// wrap.
+std::optional<int64_t> getConstantIterations(mlir::scf::ForOp loop);
 
 /// Whether a side of a condition has the loops of the other one with tests that
 /// may fail, for indices that are not all inside.
@@ -227,7 +229,7 @@ bool isPrefetch(mlir::Operation *op);
 /// lanes read it right away.
 bool asksAhead(mlir::scf::ForOp loop);
 
-/// Whether a loop turns no more often than there are lanes, as one over a
+/// Whether a loop iterates no more often than there are lanes, as one over a
 /// strip.
 bool isOneVector(mlir::scf::ForOp loop, int64_t laneCount);
 

@@ -1,4 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Arrays in records, as lanes read them. Of an array of up to 4 elements lanes
+// read all, where they need different ones. Elements of a primitive's array of
+// up to 64 that loops are expected to read four times or more are gathered
+// before the loops.
+
 #include "Vectorize/Analysis/LaneArrays.h"
 
 #include "Vectorize/Analysis/IterationLanes.h"
@@ -54,20 +60,21 @@ void piko::readAllElements(scf::ForOp root) {
 }
 
 /// How often loops inside of a root come to an operation; 1 if it is in none.
-static double countTurnsAround(Operation *op, scf::ForOp root) {
+static double countIterationsAround(Operation *op, scf::ForOp root) {
   constexpr double likely = 4;
-  double turns = 1;
+  double iterations = 1;
   for (Operation *at = op->getParentOp(); at != root; at = at->getParentOp())
     if (auto counted = dyn_cast<scf::ForOp>(at))
-      turns *= double(getConstantTurns(counted).value_or(int64_t(likely)));
+      iterations *=
+          double(getConstantIterations(counted).value_or(int64_t(likely)));
     else if (isa<scf::WhileOp>(at))
-      turns *= likely;
-  return turns;
+      iterations *= likely;
+  return iterations;
 }
 
 /// The number of elements of an array that a loop reads at a place which is the
-/// same for all lanes, of the primitive that the turn of the root has; 0 if it
-/// is another read.
+/// same for all lanes, of the primitive that the iteration of the root has; 0
+/// if it is another read.
 static int64_t countElements(GetOp get, scf::ForOp root,
                              const Uniformity &uniformity) {
   auto item = get.getPrim().getDefiningOp<ItemOp>();
@@ -105,7 +112,7 @@ void piko::copyItemArrays(scf::ForOp root) {
   root.walk([&](GetOp get) {
     int64_t count = countElements(get, root, uniformity);
     if (count > 0 && count <= mostElements &&
-        countTurnsAround(get, root) >= leastReads * double(count))
+        countIterationsAround(get, root) >= leastReads * double(count))
       arrays[{get.getPrim(), get.getFieldAttr()}].push_back(get);
   });
   for (auto &[field, gets] : arrays) {

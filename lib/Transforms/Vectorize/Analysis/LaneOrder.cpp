@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What lanes do one after the other, so that it keeps its order.
+// What lanes do one after the other, so that it keeps its order: emissions, and
+// updates of pixels that lanes may share.
+//
+// All that one image or one writer is concerned with is a group. It runs lane
+// by lane in its place, or, if nothing in the loop waits for it, as several
+// groups after all that vectors do. So a depth test, the shading of what has
+// passed it, and the update of a color run lane by lane, as vectors, and lane
+// by lane.
 
 #include "Vectorize/Analysis/IterationLanes.h"
 
@@ -35,7 +42,7 @@ const OrderedGroup *IterationLanes::findGroup(Operation *op) const {
   return nullptr;
 }
 
-/// Whether all that an operation does may be done in front of others.
+/// Whether all that an operation does may be done before others.
 bool IterationLanes::isMovable(Operation *op) const {
   WalkResult result = op->walk([&](Operation *inner) {
     LaneForm form = getForm(inner);
@@ -154,7 +161,7 @@ bool IterationLanes::areEmissions(ArrayRef<Operation *> ops) const {
   });
 }
 
-bool IterationLanes::canDefer(const OrderedGroup &group,
+bool IterationLanes::canDelay(const OrderedGroup &group,
                               const llvm::SetVector<Operation *> &rest) const {
   Block *block = group.first->getBlock();
   auto isInRest = [&](Operation *op) {
@@ -185,14 +192,12 @@ namespace {
 
 /// Whether memory is used where it stands, or later, in the order of lanes.
 struct Uses {
-  bool inPlace = false, deferred = false, changed = false;
+  bool inPlace = false, late = false, changed = false;
   /// Whether all uses are changes that commute, all of one kind.
   bool commute = true;
   std::optional<AtomicKind> kind = std::nullopt;
 
-  bool isInOrder() const {
-    return !inPlace || !deferred || !changed || commute;
-  }
+  bool isInOrder() const { return !inPlace || !late || !changed || commute; }
   void addChange(Operation *op) {
     auto atomic = dyn_cast<AtomicOp>(op);
     commute &= atomic && !atomic.getOld() &&
@@ -205,11 +210,11 @@ struct Uses {
 
 } // namespace
 
-bool IterationLanes::canDefer(ArrayRef<OrderedGroup> groups) const {
+bool IterationLanes::canDelay(ArrayRef<OrderedGroup> groups) const {
   llvm::DenseSet<Operation *> later;
   for (const OrderedGroup &group : groups) {
     llvm::SetVector<Operation *> rest = findTurns(group);
-    if (!canDefer(group, rest))
+    if (!canDelay(group, rest))
       return false;
     later.insert(rest.begin(), rest.end());
   }
@@ -219,7 +224,7 @@ bool IterationLanes::canDefer(ArrayRef<OrderedGroup> groups) const {
     bool isLater = false;
     for (Operation *at = op; at != loop && !isLater; at = at->getParentOp())
       isLater = later.contains(at);
-    (isLater ? uses.deferred : uses.inPlace) = true;
+    (isLater ? uses.late : uses.inPlace) = true;
     uses.changed |= changes;
     uses.addChange(op);
     return isLater;
@@ -233,7 +238,7 @@ bool IterationLanes::canDefer(ArrayRef<OrderedGroup> groups) const {
     } else if (auto store = dyn_cast<memref::StoreOp>(op)) {
       // What is stored before anything is read later is there by then.
       Uses &uses = arrays[store.getMemRef()];
-      bool isKnown = uses.deferred;
+      bool isKnown = uses.late;
       bool isLater = note(uses, op, /*changes=*/false);
       uses.changed |= isLater || isKnown;
     }
@@ -258,14 +263,14 @@ IterationLanes::makeGroups(ArrayRef<Operation *> ops) const {
   llvm::DenseSet<Operation *> wanted(ops.begin(), ops.end());
   if (areEmissions(ops))
     findEmissionGroups(*loop.getBody(), wanted, found);
-  if (found.empty() || !canDefer(found)) {
+  if (found.empty() || !canDelay(found)) {
     found.clear();
     findGroups(*loop.getBody(), wanted, found);
-    if (!canDefer(found))
+    if (!canDelay(found))
       return {join(found)};
   }
   for (OrderedGroup &group : found)
-    group.deferred = true;
+    group.late = true;
   return found;
 }
 

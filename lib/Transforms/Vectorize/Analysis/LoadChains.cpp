@@ -15,20 +15,20 @@ namespace {
 class ChainSearch {
 public:
   explicit ChainSearch(LoopLikeOpInterface loop) : loop(loop) {}
-  /// Whether it comes to a load behind what turns hand on.
-  bool find(Value value, bool isBehind = false);
+  /// Whether it comes to a load after what iterations hand on.
+  bool find(Value value, bool isAfter = false);
 
 private:
-  bool findInArgument(BlockArgument argument, bool isBehind);
-  bool findAny(ValueRange values, bool isBehind) {
+  bool findInArgument(BlockArgument argument, bool isAfter);
+  bool findAny(ValueRange values, bool isAfter) {
     return llvm::any_of(values,
-                        [&](Value value) { return find(value, isBehind); });
+                        [&](Value value) { return find(value, isAfter); });
   }
   /// What is stored in an array in the loop.
   bool findInArray(Value array);
 
   LoopLikeOpInterface loop;
-  std::array<llvm::DenseSet<Value>, 2> visited; ///< whether behind
+  std::array<llvm::DenseSet<Value>, 2> visited; ///< whether after
 };
 
 } // namespace
@@ -37,55 +37,54 @@ bool ChainSearch::findInArray(Value array) {
   return llvm::any_of(array.getUsers(), [&](Operation *user) {
     auto store = dyn_cast<memref::StoreOp>(user);
     return store && loop->isAncestor(store) &&
-           find(store.getValueToStore(), /*isBehind=*/true);
+           find(store.getValueToStore(), /*isAfter=*/true);
   });
 }
 
-bool ChainSearch::findInArgument(BlockArgument argument, bool isBehind) {
+bool ChainSearch::findInArgument(BlockArgument argument, bool isAfter) {
   Operation *owner = argument.getOwner()->getParentOp();
   unsigned number = argument.getArgNumber();
   if (auto repeat = dyn_cast<scf::WhileOp>(owner)) {
     if (argument.getOwner() == repeat.getAfterBody())
-      return find(repeat.getConditionOp().getArgs()[number], isBehind);
+      return find(repeat.getConditionOp().getArgs()[number], isAfter);
     return find(repeat.getYieldOp().getResults()[number],
-                isBehind || owner == loop) ||
-           (owner != loop && find(repeat.getInits()[number], isBehind));
+                isAfter || owner == loop) ||
+           (owner != loop && find(repeat.getInits()[number], isAfter));
   }
   auto range = dyn_cast<scf::ForOp>(owner);
   if (!range || number == 0)
-    return range && owner != loop && find(range.getLowerBound(), isBehind);
-  return find(range.getYieldedValues()[number - 1],
-              isBehind || owner == loop) ||
-         (owner != loop && find(range.getInitArgs()[number - 1], isBehind));
+    return range && owner != loop && find(range.getLowerBound(), isAfter);
+  return find(range.getYieldedValues()[number - 1], isAfter || owner == loop) ||
+         (owner != loop && find(range.getInitArgs()[number - 1], isAfter));
 }
 
-bool ChainSearch::find(Value value, bool isBehind) {
+bool ChainSearch::find(Value value, bool isAfter) {
   if (loop.isDefinedOutsideOfLoop(value) ||
-      !visited[isBehind].insert(value).second)
+      !visited[isAfter].insert(value).second)
     return false;
   if (auto argument = dyn_cast<BlockArgument>(value))
-    return findInArgument(argument, isBehind);
+    return findInArgument(argument, isAfter);
   Operation *op = value.getDefiningOp();
-  if (isa<LoadOp>(op) && isBehind)
+  if (isa<LoadOp>(op) && isAfter)
     return true;
   if (auto load = dyn_cast<memref::LoadOp>(op);
       load && findInArray(load.getMemRef()))
     return true;
   unsigned number = cast<OpResult>(value).getResultNumber();
   if (auto repeat = dyn_cast<scf::WhileOp>(op))
-    return find(repeat.getConditionOp().getArgs()[number], isBehind);
+    return find(repeat.getConditionOp().getArgs()[number], isAfter);
   if (auto range = dyn_cast<scf::ForOp>(op))
     return findAny(
         {range.getYieldedValues()[number], range.getInitArgs()[number]},
-        isBehind);
+        isAfter);
   // What decides is foreseen, or not: nothing waits for it.
   if (auto choice = dyn_cast<arith::SelectOp>(op))
-    return findAny({choice.getTrueValue(), choice.getFalseValue()}, isBehind);
+    return findAny({choice.getTrueValue(), choice.getFalseValue()}, isAfter);
   if (isa<scf::IfOp, scf::IndexSwitchOp>(op))
     return llvm::any_of(op->getRegions(), [&](Region &region) {
-      return find(region.front().getTerminator()->getOperand(number), isBehind);
+      return find(region.front().getTerminator()->getOperand(number), isAfter);
     });
-  return op->getNumRegions() == 0 && findAny(op->getOperands(), isBehind);
+  return op->getNumRegions() == 0 && findAny(op->getOperands(), isAfter);
 }
 
 Operation *piko::findChase(LoadOp load) {

@@ -59,7 +59,7 @@ namespace {
 
 /// The indices of an access, the one of neighbouring elements last; and the
 /// size of an element, in bytes.
-struct Place {
+struct StreamPlace {
   SmallVector<Value> indices;
   int64_t size = 0;
 };
@@ -73,9 +73,9 @@ static int64_t getRecordSize(Operation *op, FlatSymbolRefAttr stateName) {
   return record ? record.getSize() : 0;
 }
 
-static std::optional<Place> getPlace(Operation *op) {
+static std::optional<StreamPlace> getPlace(Operation *op) {
   auto ofState = [&](auto access) {
-    Place place;
+    StreamPlace place;
     place.size = getRecordSize(access, access.getStateAttr());
     // The first index is the one of neighbours.
     place.indices = llvm::to_vector(llvm::reverse(access.getIndices()));
@@ -90,17 +90,17 @@ static std::optional<Place> getPlace(Operation *op) {
   if (auto store = dyn_cast<StoreOp>(op))
     return ofState(store);
   if (auto load = dyn_cast<memref::LoadOp>(op))
-    return Place{llvm::to_vector(load.getIndices()), 1};
+    return StreamPlace{llvm::to_vector(load.getIndices()), 1};
   if (auto store = dyn_cast<memref::StoreOp>(op))
-    return Place{llvm::to_vector(store.getIndices()), 1};
+    return StreamPlace{llvm::to_vector(store.getIndices()), 1};
   if (auto get = dyn_cast<GetOp>(op); get && !get.getElements().empty())
-    return Place{llvm::to_vector(get.getElements()), 1};
+    return StreamPlace{llvm::to_vector(get.getElements()), 1};
   return {};
 }
 
 /// How the place of an access grows: by one element, if that is as small as a
 /// number or four.
-static Growth getGrowth(const Place &place, scf::ForOp loop) {
+static Growth getGrowth(const StreamPlace &place, scf::ForOp loop) {
   constexpr int64_t largest = 16;
   if (place.indices.empty())
     return Growth::None;
@@ -112,12 +112,12 @@ static Growth getGrowth(const Place &place, scf::ForOp loop) {
 }
 
 bool piko::isStream(Operation *access, scf::ForOp loop) {
-  std::optional<Place> place = getPlace(access);
+  std::optional<StreamPlace> place = getPlace(access);
   return place && getGrowth(*place, loop) == Growth::One;
 }
 
-/// Whether a value is the same in each turn of `loop`, or runs through the same
-/// ones in loops inside of it.
+/// Whether a value is the same in each iteration of `loop`, or runs through the
+/// same ones in loops inside of it.
 static bool isRepeated(Value value, scf::ForOp loop,
                        llvm::SmallDenseSet<Value> &seen) {
   if (loop.isDefinedOutsideOfLoop(value) || !seen.insert(value).second)
@@ -136,7 +136,7 @@ static bool isRepeated(Value value, scf::ForOp loop,
 }
 
 bool piko::isRepeated(Operation *access, scf::ForOp loop) {
-  std::optional<Place> place = getPlace(access);
+  std::optional<StreamPlace> place = getPlace(access);
   llvm::SmallDenseSet<Value> seen;
   return place && llvm::all_of(place->indices, [&](Value index) {
            return ::isRepeated(index, loop, seen);
@@ -171,7 +171,7 @@ static bool isStraight(Block &body, scf::ForOp loop) {
       return isShort(inner) && isStraight(*inner.getBody(), loop);
     if (op.getNumRegions() != 0)
       return false;
-    if (std::optional<Place> place = getPlace(&op)) {
+    if (std::optional<StreamPlace> place = getPlace(&op)) {
       Growth growth = getGrowth(*place, loop);
       bool isWrite = isa<StoreOp, memref::StoreOp>(op);
       return growth == Growth::One || (growth == Growth::None && !isWrite);

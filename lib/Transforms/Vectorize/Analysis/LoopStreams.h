@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops that read or write one element behind the other. Vectors along such a
+// Loops that read or write one element after the other. Vectors along such a
 // loop are loads and stores; vectors across it are gathers from as many lines
 // of the cache as there are lanes.
 
@@ -15,8 +15,9 @@ namespace piko {
 /// element from one iteration to the next.
 bool isStream(mlir::Operation *access, mlir::scf::ForOp loop);
 
-/// Whether an access is to the same elements in each turn of a loop around it,
-/// as far as is known: their lines of the cache are there from the first one.
+/// Whether an access is to the same elements in each iteration of a loop around
+/// it, as far as is known: their lines of the cache are there from the first
+/// one.
 bool isRepeated(mlir::Operation *access, mlir::scf::ForOp loop);
 
 /// Whether LLVM is expected to run iterations of an inner loop as vectors: they

@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What turns of a loop cost as lanes, and one after the other.
+// What iterations of a loop cost as lanes, and one after the other: operations,
+// times how often they run, and for how many lanes.
+//
+// Loops on one side of a condition, in place of nothing, may be a slow path, as
+// clipping is, where code goes on after it. How often it runs is not known:
+// estimates are geometric means of those with it and without it. Of more than
+// two guards in a row, each in the other, none after the second is taken to let
+// fewer through. One iteration alone waits for each load whose place a load of
+// the iteration before says (LoadChains).
 
 #include "Vectorize/Analysis/IterationLanes.h"
 #include "Vectorize/Analysis/LoadChains.h"
@@ -22,8 +30,8 @@ using namespace piko;
 /// How many operations test whether an index is linear.
 static constexpr double rowTest = 5;
 
-/// How often a loop turns.
-static constexpr double loopTurns = 8, turnsThatDiffer = 4;
+/// How often a loop iterates.
+static constexpr double loopIterations = 8, iterationsThatDiffer = 4;
 
 /// How many lanes are at work in a loop that each goes through by itself.
 static constexpr double fullness = 0.85;
@@ -116,13 +124,13 @@ static bool isNextGuard(scf::IfOp choice) {
   return other.empty() || countOperations(other) <= trivial;
 }
 
-/// Whether code of a loop goes on behind an operation.
-static bool goesOnBehind(Operation *op, Operation *loop) {
+/// Whether code of a loop goes on after an operation.
+static bool goesOnAfter(Operation *op, Operation *loop) {
   for (; op != loop; op = op->getParentOp()) {
-    int64_t behind = 0;
+    int64_t after = 0;
     for (Operation *at = op->getNextNode(); at; at = at->getNextNode())
-      at->walk([&](Operation *) { ++behind; });
-    if (behind > trivial)
+      at->walk([&](Operation *) { ++after; });
+    if (after > trivial)
       return true;
   }
   return false;
@@ -134,7 +142,7 @@ static bool goesOnBehind(Operation *op, Operation *loop) {
 static bool mayBeSlowPath(scf::IfOp choice, Region &side, Operation *loop) {
   Region &other = getOtherSide(choice, side);
   return hasLoop(side) && !other.empty() && countOperations(other) <= trivial &&
-         goesOnBehind(choice, loop);
+         goesOnAfter(choice, loop);
 }
 
 namespace {
@@ -150,9 +158,9 @@ public:
 
   IterationLanes::Cost cost;
 
-  double getFlatTurns(Operation *outer, Operation *inner) const;
-  /// How many turns a lane makes of a loop.
-  double getOwnTurns(Operation *loop) const;
+  double getFlatIterations(Operation *outer, Operation *inner) const;
+  /// How many iterations a lane makes of a loop.
+  double getOwnIterations(Operation *loop) const;
 
 private:
   void addOperation(Operation *op, Frequency times, bool laneByLane);
@@ -163,11 +171,11 @@ private:
   void addStructure(Operation *op, Frequency times, bool laneByLane);
   /// How often a region of a loop runs for each time that the loop does.
   Frequency getFrequencyInside(Operation *loop, Region &region) const;
-  double getTurns(Operation *loop) const;
-  /// How many of the lanes make a turn of a loop.
+  double getIterations(Operation *loop) const;
+  /// How many of the lanes make an iteration of a loop.
   double getGoing(Operation *loop) const;
   void addEmission(Operation *op, Frequency times);
-  /// What iterations wait for where turns say where the next ones load.
+  /// What iterations wait for where iterations say where the next ones load.
   void addChase(LoadOp load, Frequency times, bool laneByLane);
 
   /// What it takes to bring lanes apart, with what they have.
@@ -234,25 +242,25 @@ void CostModel::addTurns(const OrderedGroup &group, Frequency times) {
                   cycles.slot * times.serial * inputs.size();
 }
 
-/// How often a loop turns, as far as is known.
-double CostModel::getTurns(Operation *loop) const {
-  if (auto turns = loop->getAttrOfType<FloatAttr>(marks::turns))
-    return turns.getValueAsDouble();
-  if (std::optional<double> turns = getProbableTurns(loop))
-    return *turns / getGoing(loop);
+/// How often a loop iterates, as far as is known.
+double CostModel::getIterations(Operation *loop) const {
+  if (auto iterations = loop->getAttrOfType<FloatAttr>(marks::iterations))
+    return iterations.getValueAsDouble();
+  if (std::optional<double> iterations = getProbableIterations(loop))
+    return *iterations / getGoing(loop);
   if (auto counted = dyn_cast<scf::ForOp>(loop))
-    if (std::optional<int64_t> count = getConstantTurns(counted))
+    if (std::optional<int64_t> count = getConstantIterations(counted))
       return double(*count);
-  return lanes.isSharedLoop(loop) ? loopTurns : turnsThatDiffer;
+  return lanes.isSharedLoop(loop) ? loopIterations : iterationsThatDiffer;
 }
 
 double CostModel::getGoing(Operation *loop) const {
   if (lanes.isSharedLoop(loop))
     return 1;
-  if (loop->hasAttr(marks::turns))
+  if (loop->hasAttr(marks::iterations))
     return fullness;
   if (auto counted = dyn_cast<scf::ForOp>(loop);
-      counted && getConstantTurns(counted))
+      counted && getConstantIterations(counted))
     return 1;
   for (Operation *at = loop->getParentOp(); at != lanes.getLoop();
        at = at->getParentOp())
@@ -263,27 +271,27 @@ double CostModel::getGoing(Operation *loop) const {
   return isa<scf::ForOp>(loop) ? goOnInRange : cycles.goOn;
 }
 
-/// Each lane makes the turns of its own inner loops, and waits in the end.
-double CostModel::getFlatTurns(Operation *outer, Operation *inner) const {
+/// Each lane makes the iterations of its own inner loops, and waits in the end.
+double CostModel::getFlatIterations(Operation *outer, Operation *inner) const {
   // Measured, of lists and of searches.
   constexpr double goOnInNest = 0.35;
-  return getTurns(outer) * std::max(1.0, getTurns(inner) * goOnInNest) /
-         fullness;
+  return getIterations(outer) *
+         std::max(1.0, getIterations(inner) * goOnInNest) / fullness;
 }
 
-double CostModel::getOwnTurns(Operation *loop) const {
-  return std::max(1.0, getTurns(loop) * cycles.goOn);
+double CostModel::getOwnIterations(Operation *loop) const {
+  return std::max(1.0, getIterations(loop) * cycles.goOn);
 }
 
 Frequency CostModel::getFrequencyInside(Operation *loop, Region &region) const {
-  double turns = getTurns(loop);
-  Frequency each{turns * getGoing(loop), turns};
-  std::optional<double> again = getTurnProbability(loop);
+  double iterations = getIterations(loop);
+  Frequency each{iterations * getGoing(loop), iterations};
+  std::optional<double> again = getIterationProbability(loop);
   if (!again)
     return each;
   // One lane is enough; and what tests is tested once more.
   each.vectors =
-      std::max(turns, 1 - std::pow(1 - *again, lanes.getLaneCount()));
+      std::max(iterations, 1 - std::pow(1 - *again, lanes.getLaneCount()));
   bool isTest = isa<scf::WhileOp>(loop) && region.getRegionNumber() == 0;
   return {each.serial + isTest, each.vectors + isTest};
 }
@@ -291,7 +299,7 @@ Frequency CostModel::getFrequencyInside(Operation *loop, Region &region) const {
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   if (auto choice = dyn_cast<scf::IfOp>(op)) {
     Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
-    bool isState = op->getParentOp()->hasAttr(marks::turns);
+    bool isState = op->getParentOp()->hasAttr(marks::iterations);
     auto addSide = [&](Region &side, Region &other) {
       if (side.empty())
         return;
@@ -354,15 +362,15 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     Frequency full;
     for (size_t i = 0, e = lanes.getNest(loop).size(); i < e; ++i)
       full.serial *=
-          turnsThatDiffer * (i == 0 ? cycles.goOn : cycles.goOnInside);
+          iterationsThatDiffer * (i == 0 ? cycles.goOn : cycles.goOnInside);
     cost.vectors += cycles.pairs * times.vectors * full.serial;
     add(lanes.getNest(loop).back().getRegion(),
         times.scaled(full.serial, full.serial), laneByLane);
     return;
   }
-  double turns = getTurns(op);
+  double iterations = getIterations(op);
   if (!lanes.isSharedLoop(op) && !laneByLane)
-    cost.vectors += cycles.turn * times.vectors * turns;
+    cost.vectors += cycles.iteration * times.vectors * iterations;
   double around = along;
   if (loop) {
     inner.push_back(loop);
@@ -386,7 +394,7 @@ static bool isNarrow(Operation *access) {
   return type.isIntOrFloat() && type.getIntOrFloatBitWidth() < 32;
 }
 
-/// Whether elements one behind the other are more than the number of each that
+/// Whether elements one after the other are more than the number of each that
 /// is accessed.
 static bool isStrided(Operation *access) {
   auto load = dyn_cast<LoadOp>(access);
@@ -424,7 +432,7 @@ double CostModel::getOwnLines(Operation *access) const {
   double own = cycles.ownLines;
   for (scf::ForOp loop : llvm::make_range(inner.begin(), stream))
     if (isRepeated(access, loop))
-      own /= std::max(1.0, getTurns(loop));
+      own /= std::max(1.0, getIterations(loop));
   return own;
 }
 
@@ -452,8 +460,8 @@ double CostModel::getApart(Operation *access) const {
   double apart =
       writes ? (isNarrow(access) ? cycles.narrowScatter : cycles.scatter)
              : (isNarrow(access) ? cycles.narrowGather : cycles.gather);
-  // What a scatter wrote is not forwarded to what reads it next, which a turn
-  // that changes what is there soon does.
+  // What a scatter wrote is not forwarded to what reads it next, which an
+  // iteration that changes what is there soon does.
   constexpr double waits = 2, waitsAtOnce = 8;
   if (store && lanes.isPrivate(array))
     apart *= isReadBefore(store) ? waitsAtOnce : waits;
@@ -513,11 +521,11 @@ void CostModel::addEmission(Operation *op, Frequency times) {
 }
 
 void CostModel::addChase(LoadOp load, Frequency times, bool laneByLane) {
-  // A nest that is flattened chooses where its turns read; it was looked at
-  // before.
+  // A nest that is flattened chooses where its iterations read; it was looked
+  // at before.
   Operation *chase = findChase(load);
   if (!chase || !lanes.getLoop()->isProperAncestor(chase) ||
-      chase->hasAttr(marks::turns) ||
+      chase->hasAttr(marks::iterations) ||
       !chased.insert(load.getIndices().front()).second)
     return;
   // Loops inside begin with a wait.
@@ -580,12 +588,13 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
     cost.obstacles.emplace(vectors, op);
 }
 
-double IterationLanes::getOwnTurns(Operation *inner) const {
-  return CostModel(*this).getOwnTurns(inner);
+double IterationLanes::getOwnIterations(Operation *inner) const {
+  return CostModel(*this).getOwnIterations(inner);
 }
 
-double IterationLanes::getFlatTurns(Operation *outer, Operation *inner) const {
-  return CostModel(*this).getFlatTurns(outer, inner);
+double IterationLanes::getFlatIterations(Operation *outer,
+                                         Operation *inner) const {
+  return CostModel(*this).getFlatIterations(outer, inner);
 }
 
 IterationLanes::Cost IterationLanes::getCost() const {

@@ -40,18 +40,18 @@ struct Cycles {
   /// lane a number.
   double apart, apartInOrder, slot;
   /// Branches of a condition that differs: to what fails, around what takes
-  /// turns, and others, which are not foreseen; and of a loop whose turns
-  /// differ.
+  /// iterations, and others, which are not foreseen; and of a loop whose
+  /// iterations differ.
   double checks, branches, unforeseen, exits;
   /// What iterations wait, one after the other, for a load whose place another
   /// load has said: for the second level of the cache, and to have the place
   /// back from where it was kept.
   double chase;
-  /// What each turn of such a loop takes to find who goes on.
-  double turn;
-  /// To find which lane makes which turn, and to bring there what it has.
+  /// What each iteration of such a loop takes to find who goes on.
+  double iteration;
+  /// To find which lane makes which iteration, and to bring there what it has.
   double pairs;
-  /// How many of the lanes go on, of those that came to a loop whose turns
+  /// How many of the lanes go on, of those that came to a loop whose iterations
   /// differ; and to one inside of such a loop.
   double goOn, goOnInside;
   /// How many of the lanes have a pixel of a box's row: most boxes are those of

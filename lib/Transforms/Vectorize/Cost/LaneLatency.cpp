@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// A turn of a loop can begin when what the turn before hands on is there: the
-// longest cycle of dependences says how long that takes, the sum of all
-// operations how long units of the processor are busy. Where the first is much
-// longer, a second vector takes hardly any time.
+// An iteration of a loop can begin when what the iteration before hands on is
+// there: the longest cycle of dependences says how long that takes, the sum of
+// all operations how long units of the processor are busy. Where the first is
+// much longer, a second vector takes hardly any time.
 
 #include "Vectorize/Cost/LaneLatency.h"
 
@@ -31,13 +31,14 @@ class LoopTimer {
 public:
   explicit LoopTimer(const IterationLanes &lanes) : lanes(lanes) {}
 
-  /// Of one turn, on average.
-  Time getTurn(Operation *loop);
+  /// Of one iteration, on average.
+  Time getIteration(Operation *loop);
   /// Of what stands in a block.
   double getWork(Block &block);
 
 private:
-  /// When a value is there, of those that follow from what a turn begins with.
+  /// When a value is there, of those that follow from what an iteration begins
+  /// with.
   using Ready = llvm::DenseMap<Value, double>;
   static constexpr double never = -1e9;
 
@@ -54,8 +55,8 @@ private:
       last = std::max(last, get(ready, value));
     return last;
   }
-  /// When what a turn hands on is there, if only its input `from` is late; the
-  /// last one is the mask.
+  /// When what an iteration hands on is there, if only its input `from` is
+  /// late; the last one is the mask.
   SmallVector<double> getOutputs(Operation *loop, size_t from);
 
   /// Whether LLVM will move an operation out of the loop that is timed.
@@ -65,18 +66,19 @@ private:
   double work = 0;
   Operation *timed = nullptr;
   llvm::DenseSet<Value> invariant; ///< in the loop
-  llvm::DenseMap<Operation *, Time> turns;
+  llvm::DenseMap<Operation *, Time> iterations;
 };
 
 } // namespace
 
-static double countTurns(Operation *loop) {
+static double countIterations(Operation *loop) {
   constexpr double likely = 8;
   auto counted = dyn_cast<scf::ForOp>(loop);
-  std::optional<int64_t> turns =
-      counted ? getConstantTurns(counted) : std::nullopt;
-  return turns ? double(*turns)
-               : std::max(1.0, getProbableTurns(loop).value_or(likely));
+  std::optional<int64_t> iterations =
+      counted ? getConstantIterations(counted) : std::nullopt;
+  return iterations
+             ? double(*iterations)
+             : std::max(1.0, getProbableIterations(loop).value_or(likely));
 }
 
 /// Whether a number is only where rows begin, of which the first lane's is kept
@@ -141,13 +143,13 @@ bool LoopTimer::isInvariant(Operation *op) {
 }
 
 void LoopTimer::visitLoop(Operation *loop, Ready &ready, double start) {
-  Time turn = getTurn(loop);
-  double count = countTurns(loop);
-  work += count * turn.work;
+  Time iteration = getIteration(loop);
+  double count = countIterations(loop);
+  work += count * iteration.work;
   if (start == never)
     return;
   for (Value result : loop->getResults())
-    ready[result] = start + count * turn.latency;
+    ready[result] = start + count * iteration.latency;
 }
 
 /// Masks count where memory is accessed, and at last, where values are chosen.
@@ -223,8 +225,8 @@ SmallVector<double> LoopTimer::getOutputs(Operation *loop, size_t from) {
   return outputs;
 }
 
-Time LoopTimer::getTurn(Operation *loop) {
-  if (auto known = turns.find(loop); known != turns.end())
+Time LoopTimer::getIteration(Operation *loop) {
+  if (auto known = iterations.find(loop); known != iterations.end())
     return known->second;
   double outside = work;
   Operation *around = std::exchange(timed, loop);
@@ -235,10 +237,10 @@ Time LoopTimer::getTurn(Operation *loop) {
     outputs.push_back(getOutputs(loop, outputs.size()));
     count = outputs.front().size();
   } while (outputs.size() < count);
-  Time turn{0, work};
+  Time iteration{0, work};
   work = outside;
   timed = around;
-  // The mean of the longest cycle: what many turns take.
+  // The mean of the longest cycle: what many iterations take.
   constexpr int many = 32;
   SmallVector<double> at(count, 0);
   for (int i = 0; i < many; ++i) {
@@ -248,9 +250,9 @@ Time LoopTimer::getTurn(Operation *loop) {
         next[to] = std::max(next[to], at[from] + outputs[from][to]);
     at = next;
   }
-  turn.latency = std::max(0.0, *llvm::max_element(at) / many);
-  turns[loop] = turn;
-  return turn;
+  iteration.latency = std::max(0.0, *llvm::max_element(at) / many);
+  iterations[loop] = iteration;
+  return iteration;
 }
 
 double LoopTimer::getWork(Block &block) {
@@ -260,7 +262,8 @@ double LoopTimer::getWork(Block &block) {
   return work;
 }
 
-/// How many registers hold what differs between lanes in all turns of a loop.
+/// How many registers hold what differs between lanes in all iterations of a
+/// loop.
 static int64_t countRegisters(Operation *loop, const IterationLanes &lanes) {
   llvm::DenseSet<Value> values;
   for (Region &region : loop->getRegions())
@@ -312,11 +315,11 @@ bool piko::isBoundByLatency(const IterationLanes &lanes) {
   root.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (op == root || !isa<scf::ForOp, scf::WhileOp>(op))
       return WalkResult::advance();
-    Time turn = timer.getTurn(op);
-    double count = countTurns(op);
-    inLoops += count * turn.work;
-    one += count * std::max(turn.latency, turn.work);
-    two += count * std::max(turn.latency, 2 * turn.work);
+    Time iteration = timer.getIteration(op);
+    double count = countIterations(op);
+    inLoops += count * iteration.work;
+    one += count * std::max(iteration.latency, iteration.work);
+    two += count * std::max(iteration.latency, 2 * iteration.work);
     registers = std::max(registers, countRegisters(op, lanes));
     return WalkResult::skip();
   });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops whose turns wait for the turn before.
+// Loops whose iterations wait for the iteration before.
 
 #ifndef PIKO_LIB_TRANSFORMS_LANELATENCY_H
 #define PIKO_LIB_TRANSFORMS_LANELATENCY_H

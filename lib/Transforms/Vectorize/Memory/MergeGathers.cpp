@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-merge-gathers: lanes read, and write, fields of one record at once.
+//
+// What is made of it is up to convert-piko-to-llvm (Records): lanes that read
+// nothing load zeros; if all lanes write, each stores pieces of up to 16 bytes.
+// Of 16 lanes, consecutive elements of two to eight words (of up to four for
+// one field) are loaded and stored as vectors of their words, de-interleaved
+// and interleaved. So are primitives at consecutive positions loaded, where
+// bins have no order of their own: hence one field of them is enough.
 
 #include "Piko/Transforms/Passes.h"
 #include "Support/StateAccess.h"
@@ -92,12 +99,12 @@ static bool isWithin(Value mask, Value outer, unsigned depth = 8) {
 
 /// Whether the first read may do what the other one does, too: it comes to all
 /// that the other one comes to, with all of its lanes.
-template <typename OpT> static bool isBehind(OpT read, OpT first) {
+template <typename OpT> static bool isAfter(OpT read, OpT first) {
   return first->getBlock()->findAncestorOpInBlock(*read) &&
          isWithin(read.getMask(), first.getMask());
 }
 
-/// What lanes read in a condition is read in front of it as well where its
+/// What lanes read in a condition is read before it as well where its
 /// record is as short as a line of the cache.
 static bool isNear(GatherOp read, GatherOp first, RecordOp record) {
   constexpr int64_t lineSize = 64;
@@ -171,7 +178,7 @@ void MergeGathersPass::mergeState(KernelOp kernel) {
       GatherOp first = reads.front();
       if (first.getIndices() == gather.getIndices() &&
           first.getConsecutive() == gather.getConsecutive() &&
-          isBehind(gather, first) && isNear(gather, first, record) &&
+          isAfter(gather, first) && isNear(gather, first, record) &&
           (!isWritten || isUnchanged(gather, first, record)))
         return reads.push_back(gather);
     }
@@ -198,7 +205,7 @@ void MergeGathersPass::mergePrimitives(KernelOp kernel) {
     SmallVector<LaneGetOp> &reads = primitives[get.getAddresses()];
     if (reads.empty() ||
         (reads.front().getRecordAttr() == get.getRecordAttr() &&
-         isBehind(get, reads.front())))
+         isAfter(get, reads.front())))
       reads.push_back(get);
   });
   for (auto &[primitive, reads] : primitives) {
@@ -224,7 +231,7 @@ static bool isBeside(ScatterOp write, ArrayRef<ScatterOp> others) {
          });
 }
 
-/// Whether writes to a piece of state may be put off behind an operation.
+/// Whether writes to a piece of state may be put off after an operation.
 static bool mayPass(Operation *op, FlatSymbolRefAttr state) {
   if (isMemoryEffectFree(op))
     return true;

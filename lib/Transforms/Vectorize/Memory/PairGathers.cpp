@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-pair-gathers: lanes read two elements side by side at once.
+// piko-pair-gathers: lanes read elements side by side at once.
+//
+// As many as fit into 8 bytes make a run, and a power of two of them. Two
+// indices that are one apart but for limits, such as clamped ones, make a pair,
+// with a test whether they are here.
 
 #include "Piko/Transforms/Passes.h"
 #include "Support/StateAccess.h"
@@ -169,8 +173,8 @@ static std::optional<Candidate> findCandidate(GatherOp gather) {
   return Candidate{gather, index, guard ? guard : gather.getOperation()};
 }
 
-/// Collects what a value is computed from behind an operation of its block, if
-/// all of that may be computed in front of it.
+/// Collects what a value is computed from after an operation of its block, if
+/// all of that may be computed before it.
 static bool findSlice(Value value, Operation *front,
                       llvm::SetVector<Operation *> &slice) {
   Operation *op = value.getDefiningOp();
@@ -301,7 +305,7 @@ static SmallVector<Value> createReads(CodeBuilder at, const Run &run) {
   return SmallVector<Value>(guard.getResults());
 }
 
-/// Whether gathers have become one, in front of an operation.
+/// Whether gathers have become one, before an operation.
 static bool replace(const Run &run, Operation *front) {
   SmallVector<Value> needed;
   for (const Candidate &read : run.reads) {
@@ -337,7 +341,7 @@ public:
   bool isTaken(size_t i) const { return taken[i]; }
 
 private:
-  std::optional<size_t> findBeside(size_t of, bool isBehind,
+  std::optional<size_t> findBeside(size_t of, bool isAfter,
                                    Distance distance) const;
 
   ArrayRef<Candidate> candidates;
@@ -346,14 +350,14 @@ private:
 
 } // namespace
 
-std::optional<size_t> RunFinder::findBeside(size_t of, bool isBehind,
+std::optional<size_t> RunFinder::findBeside(size_t of, bool isAfter,
                                             Distance distance) const {
   for (size_t i = 0; i < candidates.size(); ++i) {
     Candidate from = candidates[of], to = candidates[i];
     if (i == of || taken[i] || !isWords(from.index) || !isWords(to.index) ||
         from.gather.getType() != to.gather.getType())
       continue;
-    if (!isBehind)
+    if (!isAfter)
       std::swap(from, to);
     if (findDistance(from.index, to.index) == distance)
       return i;
@@ -370,9 +374,9 @@ SmallVector<size_t> RunFinder::find(size_t first, Distance &distance) const {
   distance = Distance::Next;
   SmallVector<size_t> run{first};
   while (run.size() < most) {
-    if (auto behind = findBeside(run.back(), /*isBehind=*/true, distance))
-      run.push_back(*behind);
-    else if (auto front = findBeside(run.front(), /*isBehind=*/false, distance))
+    if (auto after = findBeside(run.back(), /*isAfter=*/true, distance))
+      run.push_back(*after);
+    else if (auto front = findBeside(run.front(), /*isAfter=*/false, distance))
       run.insert(run.begin(), *front);
     else
       break;
@@ -385,9 +389,9 @@ SmallVector<size_t> RunFinder::find(size_t first, Distance &distance) const {
     return SmallVector<size_t>(ArrayRef(run).slice(begin, count));
   }
   distance = Distance::NextOrSame;
-  if (auto behind = findBeside(first, /*isBehind=*/true, distance))
-    return {first, *behind};
-  if (auto front = findBeside(first, /*isBehind=*/false, distance))
+  if (auto after = findBeside(first, /*isAfter=*/true, distance))
+    return {first, *after};
+  if (auto front = findBeside(first, /*isAfter=*/false, distance))
     return {*front, first};
   return run;
 }

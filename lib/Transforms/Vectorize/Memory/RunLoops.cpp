@@ -17,10 +17,10 @@ using namespace piko;
 
 namespace {
 
-/// What numbers are in a turn of a loop, as far as its count says.
-class Turns {
+/// What numbers are in an iteration of a loop, as far as its count says.
+class IterationValues {
 public:
-  explicit Turns(scf::ForOp loop) : loop(loop) {}
+  explicit IterationValues(scf::ForOp loop) : loop(loop) {}
   /// By how much a number grows from one count to another.
   std::optional<int64_t> getGrowth(Value value, int64_t from, int64_t to);
 
@@ -32,7 +32,7 @@ private:
 
 } // namespace
 
-std::optional<int64_t> Turns::evaluate(Value value, int64_t count) {
+std::optional<int64_t> IterationValues::evaluate(Value value, int64_t count) {
   if (value == loop.getInductionVar())
     return count;
   APInt number;
@@ -72,7 +72,8 @@ std::optional<int64_t> Turns::evaluate(Value value, int64_t count) {
   return std::nullopt;
 }
 
-std::optional<int64_t> Turns::getGrowth(Value value, int64_t from, int64_t to) {
+std::optional<int64_t> IterationValues::getGrowth(Value value, int64_t from,
+                                                  int64_t to) {
   Operation *op = value.getDefiningOp();
   if (op ? !loop->isAncestor(op) : value.getParentBlock() != loop.getBody())
     return 0;
@@ -99,26 +100,27 @@ std::optional<int64_t> Turns::getGrowth(Value value, int64_t from, int64_t to) {
              : std::nullopt;
 }
 
-/// Whether some gather of a turn reads the element behind that of the turn
-/// before.
+/// Whether some gather of an iteration reads the element after that of the
+/// iteration before.
 static bool readsRun(scf::ForOp loop, int64_t first) {
-  Turns turns(loop);
+  IterationValues values(loop);
   return loop
       .walk([&](GatherOp gather) {
         bool isNext =
             !gather.getConsecutive() && gather.getIndices().size() == 1 &&
-            turns.getGrowth(gather.getIndices().front(), first, first + 1) == 1;
+            values.getGrowth(gather.getIndices().front(), first, first + 1) ==
+                1;
         return isNext ? WalkResult::interrupt() : WalkResult::advance();
       })
       .wasInterrupted();
 }
 
 static bool isWorthUnrolling(scf::ForOp loop) {
-  constexpr int64_t mostTurns = 64, mostOperations = 2048;
+  constexpr int64_t mostIterations = 64, mostOperations = 2048;
   std::optional<int64_t> first = getConstantIntValue(loop.getLowerBound());
-  std::optional<APInt> turns = loop.getStaticTripCount();
-  if (!first || !turns || turns->ugt(mostTurns) || turns->ult(2) ||
-      !matchPattern(loop.getStep(), m_One()))
+  std::optional<APInt> iterations = loop.getStaticTripCount();
+  if (!first || !iterations || iterations->ugt(mostIterations) ||
+      iterations->ult(2) || !matchPattern(loop.getStep(), m_One()))
     return false;
   int64_t operations = 0;
   bool isInnermost = true;
@@ -127,11 +129,11 @@ static bool isWorthUnrolling(scf::ForOp loop) {
     isInnermost &= op == loop || !isa<scf::ForOp>(op);
   });
   return isInnermost &&
-         operations * int64_t(turns->getZExtValue()) <= mostOperations &&
+         operations * int64_t(iterations->getZExtValue()) <= mostOperations &&
          readsRun(loop, *first);
 }
 
-/// Constants of the turn that a loop was, as far as they follow.
+/// Constants of the iteration that a loop was, as far as they follow.
 static void foldOperations(Block &block) {
   IRRewriter rewriter(block.getParentOp()->getContext());
   for (Operation &op : llvm::make_early_inc_range(block)) {
@@ -157,7 +159,7 @@ void piko::unrollRuns(Operation *kernel) {
   }
   if (loops.empty())
     return;
-  // What turns compute alike is one value then.
+  // What iterations compute alike is one value then.
   IRRewriter rewriter(kernel->getContext());
   DominanceInfo dominance(kernel);
   eliminateCommonSubExpressions(rewriter, dominance, kernel);

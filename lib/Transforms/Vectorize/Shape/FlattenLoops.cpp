@@ -7,8 +7,8 @@
 //   }                      }
 //
 // Where C stands for all the work of the inner loop, as in `do ... while`, it
-// is done once in a turn, and D or E follows. The state of the loop that is
-// made is that of the inner loop, and what B computes for it and for E; its
+// is done once in an iteration, and D or E follows. The state of the loop that
+// is made is that of the inner loop, and what B computes for it and for E; its
 // results take the same places, once it is left.
 
 #include "Vectorize/Shape/FlattenLoops.h"
@@ -78,8 +78,8 @@ static bool isCheapTest(Operation *loop) {
          });
 }
 
-/// What is computed in the outer loop in front of the inner one, and used in it
-/// or behind it; its own counter goes without saying.
+/// What is computed in the outer loop before the inner one, and used in it
+/// or after it; its own counter goes without saying.
 static llvm::SetVector<Value> findKept(FlatNest nest) {
   llvm::SetVector<Value> kept;
   Block *block = nest.inner->getBlock();
@@ -156,7 +156,7 @@ private:
   Values getInits(Operation *loop);
   Test writeTest(Operation *loop, ValueRange carried);
   Test writeTest(scf::WhileOp loop);
-  /// What the next turn of a loop carries, at the end of its body.
+  /// What the next iteration of a loop carries, at the end of its body.
   Values getNext(Operation *loop);
   Values writeBody(Operation *loop, ValueRange handed);
   void setArguments(Operation *loop, ValueRange handed);
@@ -171,7 +171,7 @@ private:
   Values leave(ValueRange handed);
   Values writeStart(ValueRange carried);
   Values writeAdvance(ValueRange handed);
-  Values writeTurn(ValueRange state);
+  Values writeIteration(ValueRange state);
   /// Chooses what state is next: a lane that does not go on may wait.
   Values writeWait(Value goesOn, llvm::function_ref<Values()> stay,
                    llvm::function_ref<Values()> advance);
@@ -345,7 +345,7 @@ Flattener::Values Flattener::leave(ValueRange handed) {
   return state;
 }
 
-/// A turn of the outer loop, up to the inner one.
+/// An iteration of the outer loop, up to the inner one.
 Flattener::Values Flattener::writeStart(ValueRange carried) {
   Operation *first = &nest.inner->getBlock()->front();
   if (isInTest()) {
@@ -379,8 +379,8 @@ Flattener::Values Flattener::writeAdvance(ValueRange handed) {
       [&] { return leave(test.handed); });
 }
 
-/// A lane that waits finds its test to fail again in the next turn.
-Flattener::Values Flattener::writeTurn(ValueRange state) {
+/// A lane that waits finds its test to fail again in the next iteration.
+Flattener::Values Flattener::writeIteration(ValueRange state) {
   size_t count = getInits(nest.inner).size();
   ValueRange carried = state.drop_front().take_front(count);
   mapping.map(kept.getArrayRef(),
@@ -389,19 +389,19 @@ Flattener::Values Flattener::writeTurn(ValueRange state) {
     setCounter(counted, state[1 + count + kept.size()]);
   Test test = writeTest(nest.inner, carried);
   auto advance = [&] { return writeAdvance(test.handed); };
-  auto turn = [&] {
+  auto iteration = [&] {
     return writeChoice(
         test.goesOn, carried.getTypes(),
         [&] { return writeBody(nest.inner, test.handed); },
         [&] { return llvm::to_vector(carried); });
   };
   if (isCheapTest(nest.inner)) {
-    Values next = turn();
+    Values next = iteration();
     test = writeTest(nest.inner, next);
     return writeWait(test.goesOn, [&] { return stay(next); }, advance);
   }
   if (nest.advances)
-    return writeWait(test.goesOn, [&] { return stay(turn()); }, advance);
+    return writeWait(test.goesOn, [&] { return stay(iteration()); }, advance);
   return writeChoice(
       test.goesOn, types,
       [&] { return stay(writeBody(nest.inner, test.handed)); }, advance);
@@ -425,8 +425,8 @@ scf::WhileOp Flattener::write() {
   Block *test = builder.createBlock(&made.getBefore(), {}, types, places);
   scf::ConditionOp::create(builder, loc, test->getArgument(0),
                            test->getArguments());
-  Block *turn = builder.createBlock(&made.getAfter(), {}, types, places);
-  scf::YieldOp::create(builder, loc, writeTurn(turn->getArguments()));
+  Block *iteration = builder.createBlock(&made.getAfter(), {}, types, places);
+  scf::YieldOp::create(builder, loc, writeIteration(iteration->getArguments()));
   for (auto [result, place] : llvm::zip_equal(nest.outer->getResults(), at))
     if (place)
       result.replaceAllUsesWith(made.getResult(*place));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loop flattening: two loops, one inside of the other, as one whose turns are
-// those of the inner loop, so that lanes which have ended it need not wait for
-// those which have not.
+// Loop flattening: two loops, one inside of the other, as one whose iterations
+// are those of the inner loop, so that lanes which have ended it need not wait
+// for those which have not.
 
 #ifndef PIKO_LIB_TRANSFORMS_FLATTENLOOPS_H
 #define PIKO_LIB_TRANSFORMS_FLATTENLOOPS_H
@@ -14,8 +14,8 @@ namespace piko {
 /// A loop, and the only one that stands in it by itself.
 struct FlatNest {
   mlir::Operation *outer = nullptr, *inner = nullptr;
-  /// In how many of its turns a lane is expected to go on to the next one of
-  /// the outer loop, where lanes wait for others before they do; else all of
+  /// In how many of its iterations a lane is expected to go on to the next one
+  /// of the outer loop, where lanes wait for others before they do; else all of
   /// them.
   std::optional<double> advances = std::nullopt;
 
@@ -23,13 +23,13 @@ struct FlatNest {
 };
 
 /// What `outer`, an scf.for or an scf.while, is a nest of. None where another
-/// loop stands beside the inner one, or where what it keeps from turn to turn
-/// is no number.
+/// loop stands beside the inner one, or where what it keeps from iteration to
+/// iteration is no number.
 FlatNest findFlatNest(mlir::Operation *outer);
 
 /// Replaces a nest by one loop that does the same in the same order. Each of
-/// its turns makes one of the inner loop, and, where that has ended, goes on to
-/// the next turn of the outer loop, up to the inner one.
+/// its iterations makes one of the inner loop, and, where that has ended, goes
+/// on to the next iteration of the outer loop, up to the inner one.
 mlir::scf::WhileOp flatten(FlatNest nest);
 
 } // namespace piko

@@ -1,4 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Nests of an iteration in which lanes would wait for the one that iterates
+// most, as over the probes of a hash table in each of eight corners, are
+// flattened: each lane goes through the nest by itself (FlattenLoops). A lane
+// does what it did, in the order that it did. Nests whose order shows between
+// lanes, as they emit or update pixels that lanes may share, stay, and a note
+// says so.
+//
+// Where all that iterations do by themselves is one such loop, as rays that end
+// at different times have, the loop over iterations is flattened as well. Lanes
+// take iterations that are as many apart as there are lanes, and each goes on
+// to its next one by itself. It waits with that until three eighths of the
+// lanes do, or no other one has anything to do.
+//
+// Loops are flattened where that is expected to take a fifth less.
 
 #include "Vectorize/Shape/LaneNests.h"
 
@@ -40,7 +55,8 @@ static bool isFree(Operation *loop, const IterationLanes &lanes) {
 /// Whether lanes may leave a loop at different times.
 static bool isDivergent(Operation *loop, const IterationLanes &lanes) {
   auto counted = dyn_cast<scf::ForOp>(loop);
-  return !lanes.isSharedLoop(loop) && !(counted && getConstantTurns(counted));
+  return !lanes.isSharedLoop(loop) &&
+         !(counted && getConstantIterations(counted));
 }
 
 /// The nests of an iteration whose inner loop lanes leave at different times,
@@ -62,7 +78,7 @@ static FlatNest findNest(const IterationLanes &lanes, size_t skipped) {
   return found;
 }
 
-/// What is the same in all turns is no part of their state.
+/// What is the same in all iterations is no part of their state.
 static void hoistFromNest(Operation *loop, const IterationLanes &lanes) {
   for (Region &region : loop->getRegions())
     for (LoadOp load : llvm::make_early_inc_range(region.getOps<LoadOp>()))
@@ -88,7 +104,7 @@ static SmallVector<Location> findOrdered(const IterationLanes &lanes) {
 /// otherwise erases it.
 static bool tryLoop(FlatLoop &best, scf::ForOp loop, int64_t laneCount,
                     Location nest) {
-  constexpr double gain = 0.8; // Turns are estimated.
+  constexpr double gain = 0.8; // Iterations are estimated.
   IterationLanes lanes(loop, laneCount);
   IterationLanes::Cost cost = lanes.getCost();
   // A loop that is made of two is not known to stream.
@@ -108,8 +124,8 @@ static bool tryLoop(FlatLoop &best, scf::ForOp loop, int64_t laneCount,
   return true;
 }
 
-static void setTurns(scf::WhileOp loop, double turns) {
-  loop->setAttr(marks::turns, Builder(loop).getF64FloatAttr(turns));
+static void setIterations(scf::WhileOp loop, double iterations) {
+  loop->setAttr(marks::iterations, Builder(loop).getF64FloatAttr(iterations));
 }
 
 static scf::ForOp clone(scf::ForOp loop) {
@@ -150,9 +166,9 @@ static scf::ForOp stripMine(scf::ForOp loop, int64_t laneCount) {
   Value lower = loop.getLowerBound(), upper = loop.getUpperBound();
   Value width = arith::ConstantOp::create(
       builder, loc, builder.getIntegerAttr(lower.getType(), laneCount));
-  Value behind = arith::AddIOp::create(builder, loc, lower, width,
-                                       arith::IntegerOverflowFlags::nsw);
-  Value end = arith::MinSIOp::create(builder, loc, behind, upper);
+  Value after = arith::AddIOp::create(builder, loc, lower, width,
+                                      arith::IntegerOverflowFlags::nsw);
+  Value end = arith::MinSIOp::create(builder, loc, after, upper);
   auto ofLanes = scf::ForOp::create(builder, loc, lower, end, loop.getStep());
   ofLanes->setAttrs(loop->getAttrs());
   builder.setInsertionPointToStart(ofLanes.getBody());
@@ -169,7 +185,7 @@ static scf::ForOp stripMine(scf::ForOp loop, int64_t laneCount) {
   return ofLanes;
 }
 
-/// Reads what is used behind a loop in front of it.
+/// Reads what is used after a loop before it.
 static void readAhead(Operation *loop) {
   for (Operation *op = loop->getNextNode(), *next; op; op = next) {
     next = op->getNextNode();
@@ -193,7 +209,7 @@ static void flattenIterations(FlatLoop &best, const IterationLanes &lanes) {
     return;
   }
   constexpr double fullness = 0.85, atOnce = 3.0 / 8;
-  double turns = before.getOwnTurns(inner);
+  double iterations = before.getOwnIterations(inner);
   Location loc = loop.getLoc();
   SmallVector<Value> writers;
   for (NextOp next :
@@ -209,8 +225,8 @@ static void flattenIterations(FlatLoop &best, const IterationLanes &lanes) {
     loop.erase();
     return;
   }
-  nest.advances = std::min(1.0, 1 / (turns * atOnce));
-  setTurns(flatten(nest), turns / fullness);
+  nest.advances = std::min(1.0, 1 / (iterations * atOnce));
+  setIterations(flatten(nest), iterations / fullness);
   if (tryLoop(best, loop, laneCount, loc))
     best.writers = writers;
 }
@@ -243,9 +259,9 @@ FlatLoop piko::flattenNests(const IterationLanes &lanes) {
       break;
     }
     Location loc = nest.outer->getLoc();
-    double turns = before.getFlatTurns(nest.outer, nest.inner);
+    double iterations = before.getFlatIterations(nest.outer, nest.inner);
     hoistFromNest(nest.outer, before);
-    setTurns(flatten(findFlatNest(nest.outer)), turns);
+    setIterations(flatten(findFlatNest(nest.outer)), iterations);
     skipped += !tryLoop(best, loop, lanes.getLaneCount(), loc);
   }
   flattenIterations(best, lanes);

@@ -21,7 +21,7 @@ struct FlatLoop {
   llvm::SmallVector<mlir::Value> writers = {};
 };
 
-/// Counts all primitives of a loop in front of where it stands.
+/// Counts all primitives of a loop before where it stands.
 void countPrimitives(mlir::scf::ForOp loop, mlir::ValueRange writers);
 
 /// Flattens each nest whose inner loop lanes leave at different times, where

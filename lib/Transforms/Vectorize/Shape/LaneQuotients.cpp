@@ -1,4 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Barycentric coordinates, and other quotients by what all lanes share, decide
+// whether an iteration goes on: their dividends are tested first, so that
+// vectors without an iteration that may go on divide nothing. Integers that are
+// divided by what all lanes share, neither 0 nor -1, have no dividend that
+// needs a test.
+
 #include "Vectorize/Shape/LaneQuotients.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -19,7 +26,7 @@ static bool isDecided(arith::CmpFOp test, bool skips) {
                             test.getPredicate());
 }
 
-/// The quotient by what is the same in all turns; or null.
+/// The quotient by what is the same in all iterations; or null.
 static arith::DivFOp findQuotient(Value value, scf::ForOp root) {
   auto quotient = value.getDefiningOp<arith::DivFOp>();
   bool isShared =
@@ -28,8 +35,8 @@ static arith::DivFOp findQuotient(Value value, scf::ForOp root) {
   return isShared ? quotient : arith::DivFOp();
 }
 
-/// What tests compare that decide, where they are negative, that a turn does
-/// not go on.
+/// What tests compare that decide, where they are negative, that an iteration
+/// does not go on.
 struct Tested {
   llvm::SetVector<arith::DivFOp> quotients;
   /// Pairs of quotients by one divisor whose sum is taken off 1, as for the
@@ -73,7 +80,7 @@ static void findTested(Value condition, bool skips, scf::ForOp root,
 
 namespace {
 
-/// Tests of dividends by what is the same in all turns.
+/// Tests of dividends by what is the same in all iterations.
 class DividendTests {
 public:
   explicit DividendTests(OpBuilder &builder, scf::ForOp root)
@@ -91,7 +98,7 @@ private:
   }
 
   OpBuilder &builder;
-  OpBuilder front; ///< in front of all turns
+  OpBuilder front; ///< before all iterations
 };
 
 } // namespace

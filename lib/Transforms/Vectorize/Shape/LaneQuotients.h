@@ -9,9 +9,9 @@
 
 namespace piko {
 
-/// Where a turn goes on only if quotients by what all turns share are not
-/// negative, as barycentric coordinates are, tests their dividends in front:
-/// vectors of which no lane goes on divide nothing.
+/// Where an iteration goes on only if quotients by what all iterations share
+/// are not negative, as barycentric coordinates are, tests their dividends in
+/// front: vectors of which no lane goes on divide nothing.
 void testDividends(mlir::scf::ForOp root);
 
 /// Where lanes divide integers by what all share, and that is neither 0 nor -1,

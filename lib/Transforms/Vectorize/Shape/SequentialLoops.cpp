@@ -1,4 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Loops in order, as lanes and in compacted form. Iterations may emit, which
+// keeps its order in lanes, too.
+//
+// Stream compaction: where all that an iteration does stands under a condition,
+// and has a loop of its own, a first loop finds which of 1,024 iterations have
+// something to do, a second one lists them without branches, and a third one
+// does it, so that its vectors are full.
 
 #include "Vectorize/Shape/SequentialLoops.h"
 
@@ -23,7 +31,7 @@ using namespace piko;
 
 namespace {
 
-/// What the turns of a loop do to memory.
+/// What the iterations of a loop do to memory.
 class Effects {
 public:
   explicit Effects(scf::ForOp loop) : loop(loop) {
@@ -37,7 +45,7 @@ private:
     return loop->isAncestor(array.getParentBlock()->getParentOp());
   }
   bool isOnce(StoreOp store);
-  bool isOfTurn(AppendBinOp place);
+  bool isOfIteration(AppendBinOp place);
   bool isKnown(Operation *op);
 
   scf::ForOp loop;
@@ -48,7 +56,7 @@ private:
 
 } // namespace
 
-/// Whether a turn stores a number at most once, and no other store does.
+/// Whether an iteration stores a number at most once, and no other store does.
 bool Effects::isOnce(StoreOp store) {
   for (Operation *at = store->getParentOp(); at != loop; at = at->getParentOp())
     if (isa<scf::ForOp, scf::WhileOp>(at))
@@ -57,8 +65,8 @@ bool Effects::isOnce(StoreOp store) {
          fields.insert({store.getStateAttr(), store.getFieldAttr()}).second;
 }
 
-/// Whether what is put into a bin was emitted in the same turn.
-bool Effects::isOfTurn(AppendBinOp place) {
+/// Whether what is put into a bin was emitted in the same iteration.
+bool Effects::isOfIteration(AppendBinOp place) {
   bool isEmitted = false;
   loop.walk([&](AppendOp append) {
     isEmitted |= append.getWriter() == place.getWriter() &&
@@ -70,7 +78,7 @@ bool Effects::isOfTurn(AppendBinOp place) {
 /// What is emitted keeps its order in lanes, too.
 bool Effects::isKnown(Operation *op) {
   if (auto place = dyn_cast<AppendBinOp>(op))
-    return isOfTurn(place);
+    return isOfIteration(place);
   if (isa<AppendOp>(op))
     return true;
   if (auto store = dyn_cast<StoreOp>(op))
@@ -99,7 +107,7 @@ static bool isIndependent(scf::ForOp loop) {
   return loop.getNumResults() == 0 && Effects(loop).areIndependent();
 }
 
-/// Whether it turns less often than there are lanes, as far as is known.
+/// Whether it iterates less often than there are lanes, as far as is known.
 static bool isShort(scf::ForOp loop, int64_t laneCount) {
   std::optional<APInt> count = loop.getStaticTripCount();
   return count && count->slt(laneCount);
@@ -130,7 +138,7 @@ static bool computes(Operation *op) {
          llvm::any_of(op->getOperands(), isRead);
 }
 
-/// Whether turns only clear or copy, which LLVM does well.
+/// Whether iterations only clear or copy, which LLVM does well.
 static bool onlyMoves(scf::ForOp loop) {
   return !loop.getBody()
               ->walk([](Operation *op) {
@@ -141,7 +149,7 @@ static bool onlyMoves(scf::ForOp loop) {
 }
 
 /// Whether a loop begins at a place in memory or a number of 32 bits, so that
-/// steps of several turns do not leave 64. A user's own 64 may be the last
+/// steps of several iterations do not leave 64. A user's own 64 may be the last
 /// ones.
 static bool beginsEarly(scf::ForOp loop) {
   Value lower = loop.getLowerBound();
@@ -163,7 +171,7 @@ bool piko::mayRunInOrder(scf::ForOp loop, int64_t laneCount) {
 // Compaction
 //===----------------------------------------------------------------------===//
 
-/// The condition that all a turn does stands behind, if it has a loop.
+/// The condition that all an iteration does stands after, if it has a loop.
 static scf::IfOp findOnlyCondition(scf::ForOp loop) {
   scf::IfOp only;
   for (Operation &op : loop.getBody()->without_terminator()) {
@@ -188,7 +196,7 @@ static scf::IfOp findOnlyCondition(scf::ForOp loop) {
 
 namespace {
 
-/// Writes the loops in front of the one that they stand for.
+/// Writes the loops before the one that they stand for.
 class Compactor {
 public:
   Compactor(scf::ForOp loop, scf::IfOp condition)
@@ -203,7 +211,7 @@ private:
     return memref::AllocaOp::create(builder, loc,
                                     MemRefType::get({stripSize}, type));
   }
-  /// What a turn does in front of its condition.
+  /// What an iteration does before its condition.
   IRMapping writeTurn(Value place);
   scf::ForOp writeFinds(Value count, Value flags);
   Value writePlaces(Value count, Value flags, Value places);

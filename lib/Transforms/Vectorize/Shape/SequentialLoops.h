@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops of phases whose turns are written in order, though none needs what
+// Loops of phases whose iterations are written in order, though none needs what
 // another one did.
 
 #ifndef PIKO_LIB_TRANSFORMS_SEQUENTIALLOOPS_H
@@ -10,21 +10,22 @@
 
 namespace piko {
 
-/// Whether lanes should share the turns of a loop, if their cost allows. They
-/// may: turns hand on nothing, read nothing that they change, and change each
-/// field of state in one place, once in a turn, where lanes keep their order.
-/// And it is not known that the loop is short, or that LLVM does it well.
+/// Whether lanes should share the iterations of a loop, if their cost allows.
+/// They may: iterations hand on nothing, read nothing that they change, and
+/// change each field of state in one place, once in an iteration, where lanes
+/// keep their order. And it is not known that the loop is short, or that LLVM
+/// does it well.
 bool mayRunInOrder(mlir::scf::ForOp loop, int64_t laneCount);
 
-/// Stream compaction: a loop that finds which turns of another one have
-/// something to do, and one over these turns.
+/// Stream compaction: a loop that finds which iterations of another one have
+/// something to do, and one over these iterations.
 struct Compaction {
   mlir::scf::ForOp strips; ///< around both, instead of the loop
   mlir::scf::ForOp finds, does;
 };
 
-/// Of a loop whose turns do nothing but what stands behind one condition, which
-/// has a loop of its own; none of others.
+/// Of a loop whose iterations do nothing but what stands under one condition,
+/// which has a loop of its own; none of others.
 std::optional<Compaction> compact(mlir::scf::ForOp loop);
 
 } // namespace piko

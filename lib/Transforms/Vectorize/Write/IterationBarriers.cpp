@@ -165,9 +165,8 @@ void IterationWriter::writeSort(SortOp sort) {
     Value other = ofLane(key, lane);
     Value less = createLess(builder, loc, other, key, sort.getIsUnsigned());
     Value more = createLess(builder, loc, key, other, sort.getIsUnsigned());
-    Value isBehind = createMask([&](int64_t own) { return own > lane; });
-    Value ahead =
-        at.either(less, choose(more, zeros(more.getType()), isBehind));
+    Value isAfter = createMask([&](int64_t own) { return own > lane; });
+    Value ahead = at.either(less, choose(more, zeros(more.getType()), isAfter));
     rank = choose(ahead, at.add(rank, number(1)), rank);
   }
   Value own = arith::IndexCastOp::create(

@@ -269,10 +269,10 @@ void IterationWriter::writeVaryingFor(scf::ForOp inner) {
     next.push_back(lanes.isVarying(argument)
                        ? choose(active, get(value), get(argument))
                        : getUniform(value));
-  size_t behind = 1 + inner.getNumRegionIterArgs();
+  size_t atEnd = 1 + inner.getNumRegionIterArgs();
   for (auto [at, i] : llvm::enumerate(shared))
     next.push_back(choose(active, get(inner.getYieldedValues()[i]),
-                          after->getArgument(behind + at)));
+                          after->getArgument(atEnd + at)));
   next.push_back(both(
       active, arith::CmpIOp::create(builder, loc, P::ugt, rest, widen(step))));
   scf::YieldOp::create(builder, loc, next);
@@ -282,7 +282,7 @@ void IterationWriter::writeVaryingFor(scf::ForOp inner) {
     if (lanes.isVarying(inner.getRegionIterArg(i)))
       vectors.map(result, made.getResult(1 + i));
   for (auto [at, i] : llvm::enumerate(shared))
-    vectors.map(inner.getResult(i), made.getResult(behind + at));
+    vectors.map(inner.getResult(i), made.getResult(atEnd + at));
 }
 
 void IterationWriter::writeWhile(scf::WhileOp inner) {
@@ -317,7 +317,7 @@ void IterationWriter::writeWhile(scf::WhileOp inner) {
 
 void IterationWriter::writeVaryingWhile(scf::WhileOp inner) {
   // Its variables are those of the loop, what it left for each lane that has
-  // ended, and the mask. Behind the mask the condition hands on what is the
+  // ended, and the mask. After the mask the condition hands on what is the
   // same for the lanes that go on.
   SmallVector<Value> inits;
   for (auto [variable, init] :
@@ -425,7 +425,7 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   }
   loop.walk([&](memref::AllocaOp array) { writePrivate(array); });
   builder.setInsertionPointToStart(body);
-  // Step by what is left: a number behind the last may be too large.
+  // Step by what is left: a number after the last may be too large.
   firsts.map(loop.getInductionVar(), first);
   Value steps = vector::StepOp::create(builder, loc,
                                        getVectorType(builder.getIndexType()));
@@ -437,6 +437,6 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   active = writeActive(arith::SubIOp::create(builder, loc, upper, first));
   createMasks();
   writeBlock(*loop.getBody());
-  writeDeferred();
+  writeLate();
   writeLastFlushes();
 }

@@ -1,8 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Emissions that vectors make for all lanes: those behind all that lanes
-// compute, a few of each iteration to a port. Where positions are counted, each
-// lane emits in its turn nevertheless.
+// Emissions that vectors make for all lanes (piko.cpu.append): those after all
+// that lanes compute, up to three records of a lane to a port. Room is made
+// once, fields are transposed into records, and each lane stores its own where
+// the number of those before it says.
+//
+// Lanes take turns instead where few emit (three eighths; one eighth of records
+// up to 16 bytes), or positions are counted (piko.cpu.is_counted). They always
+// do where a loop of each lane emits, a record may go to several bins, or it is
+// no whole number of words of 4 bytes, or more than 256 bytes. Records whose
+// fields vectors have are transposed before lanes take turns, and copied
+// (piko.cpu.store_records).
 
 #include "Vectorize/Write/IterationWriter.h"
 
@@ -89,7 +97,7 @@ StringRef IterationLanes::explainTurns(Operation *emission) const {
 /// it.
 bool IterationLanes::addEmission(Operation *op, PortEmissions &port) const {
   const OrderedGroup *group = findGroup(op);
-  if (!group || !group->deferred || !hasVectors(op, findTurns(*group)))
+  if (!group || !group->late || !hasVectors(op, findTurns(*group)))
     return false;
   SmallVector<LaneRecord> &records = port.records;
   if (auto append = dyn_cast<AppendOp>(op)) {
@@ -172,7 +180,7 @@ Value IterationWriter::loadMask(const Turn &turn) {
 
 const IterationWriter::Turn &
 IterationWriter::findTurn(LaneRecord record) const {
-  return *llvm::find_if(deferred, [&](const Turn &turn) {
+  return *llvm::find_if(late, [&](const Turn &turn) {
     return llvm::is_contained(turn.ops, record.append.getOperation());
   });
 }
@@ -244,7 +252,7 @@ Value IterationWriter::writeAreFew() {
 /// What is left for turns where vectors emit, and positions are not counted.
 SmallVector<IterationWriter::Turn> IterationWriter::findOtherTurns() const {
   SmallVector<Turn> others;
-  for (const Turn &turn : deferred) {
+  for (const Turn &turn : late) {
     Turn other = turn;
     llvm::erase_if(other.ops, [&](Operation *op) {
       return isa<NextOp>(op) || lanes.isEmission(op);
@@ -255,15 +263,15 @@ SmallVector<IterationWriter::Turn> IterationWriter::findOtherTurns() const {
   return others;
 }
 
-void IterationWriter::writeDeferred() {
-  if (deferred.empty())
+void IterationWriter::writeLate() {
+  if (late.empty())
     return;
   llvm::SetVector<Value> writers;
   for (const PortEmissions &port : lanes.getEmissions())
     writers.insert(getUniform(port.writer));
   if (writers.empty())
-    return writeDeferredTurns(deferred);
-  for (const Turn &turn : deferred)
+    return writeLateTurns(late);
+  for (const Turn &turn : late)
     for (Operation *op : turn.ops)
       op->walk(
           [&](NextOp next) { writers.insert(getUniform(next.getWriter())); });
@@ -274,10 +282,10 @@ void IterationWriter::writeDeferred() {
   auto choice =
       scf::IfOp::create(builder, loc, inTurns, /*withElseRegion=*/true);
   builder.setInsertionPointToStart(choice.thenBlock());
-  writeDeferredTurns(deferred);
+  writeLateTurns(late);
   builder.setInsertionPointToStart(choice.elseBlock());
   for (const PortEmissions &port : lanes.getEmissions())
     writeEmissions(port);
-  writeDeferredTurns(findOtherTurns());
+  writeLateTurns(findOtherTurns());
   builder.setInsertionPointAfter(choice);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops whose turns differ between lanes, collapsed: vectors are filled with
-// pairs of a lane and a turn, by a scan over how many turns lanes make.
+// Loop collapsing: vectors are filled with pairs of a lane and an iteration of
+// its inner loops, by a scan over how many iterations each lane makes, so that
+// pixels of small boxes leave few lanes idle. Where a lane makes more than
+// 1,024 iterations of one loop, lanes go through the loops in step.
 
 #include "Vectorize/Write/IterationWriter.h"
 
@@ -15,9 +17,9 @@
 using namespace mlir;
 using namespace piko;
 
-/// With more turns of a loop the quotient of two floats would not be exact: it
-/// is less than 2^10, of numbers below 2^20, so that two rounding errors are
-/// less than 2^-13, and it is at least 2^-11 away from an integer.
+/// With more iterations of a loop the quotient of two floats would not be
+/// exact: it is less than 2^10, of numbers below 2^20, so that two rounding
+/// errors are less than 2^-13, and it is at least 2^-11 away from an integer.
 static constexpr int64_t mostTurns = 1024;
 
 Value IterationWriter::number(int64_t value) {
@@ -47,7 +49,7 @@ Value IterationWriter::findLane(Value ends, Value place) {
     }
     return lane;
   }
-  // The last one ends behind all places that count.
+  // The last one ends after all places that count.
   for (int64_t i = 0; i + 1 < laneCount; ++i) {
     Value end = splat(vector::ExtractOp::create(builder, loc, ends, i));
     lane = choose(at.compare(P::sle, end, place), at.add(lane, one), lane);

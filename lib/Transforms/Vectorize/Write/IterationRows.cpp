@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Reads of rows with ends: where an index is clamped to an image, or wraps
-// around in it, most vectors are in its middle, and read one element behind the
+// around in it, most vectors are in its middle, and read one element after the
 // other.
 
 #include "Vectorize/Write/IterationWriter.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What runs for one lane after the other: in its place, or behind all that
+// What runs for one lane after the other: in its place, or after all that
 // vectors do. Values of lanes go through memory, a slot for each.
 
 #include "Vectorize/Write/IterationWriter.h"
@@ -91,9 +91,8 @@ class SerialInputs {
 public:
   /// Those of `records` are stored by vectors.
   SerialInputs(const IterationLanes &lanes, ArrayRef<Operation *> ops,
-               const llvm::MapVector<Operation *, Value> &records,
-               bool isDeferred)
-      : lanes(lanes), ops(ops.begin(), ops.end()), isDeferred(isDeferred) {
+               const llvm::MapVector<Operation *, Value> &records, bool isLate)
+      : lanes(lanes), ops(ops.begin(), ops.end()), isLate(isLate) {
     for (Operation *op : ops)
       if (!records.contains(op))
         op->walk([&](Operation *inner) {
@@ -125,7 +124,7 @@ private:
     Operation *op = value.getDefiningOp();
     bool isConstant = op && op->hasTrait<OpTrait::ConstantLike>();
     // Each lane widens its own index: vectors of 64 bits are two.
-    bool isWidened = !isDeferred && isa_and_nonnull<arith::IndexCastOp>(op) &&
+    bool isWidened = !isLate && isa_and_nonnull<arith::IndexCastOp>(op) &&
                      value.getType().isIndex();
     if (isLaneType(value.getType()) && !isConstant && !isWidened) {
       (lanes.isVarying(value) ? varying : uniform).insert(value);
@@ -138,7 +137,7 @@ private:
 
   const IterationLanes &lanes;
   llvm::DenseSet<Operation *> ops;
-  bool isDeferred;
+  bool isLate;
 };
 
 } // namespace
@@ -190,24 +189,23 @@ static SmallVector<Value> findOutputs(ArrayRef<Operation *> ops) {
   return outputs;
 }
 
-IterationWriter::Turn IterationWriter::prepareTurn(Operation *first,
-                                                   Operation *last,
-                                                   bool isDeferred) {
+IterationWriter::Turn
+IterationWriter::prepareTurn(Operation *first, Operation *last, bool isLate) {
   Turn turn;
   turn.ops = findRest(first, last);
   for (Operation *op : turn.ops)
     if (auto append = dyn_cast<AppendOp>(op);
         append && lanes.isStoredByVectors(append))
       turn.records[append] = writeRecords(append);
-  SerialInputs inputs(lanes, turn.ops, turn.records, isDeferred);
+  SerialInputs inputs(lanes, turn.ops, turn.records, isLate);
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (Value value : inputs.varying) {
     Value slot = turn.varying[value] = createSlot(value.getType());
     storeSlot(get(value), slot, start);
   }
-  // Behind all, what stands here is not known.
+  // After all, what stands here is not known.
   for (Value value : inputs.uniform) {
-    if (!isDeferred)
+    if (!isLate)
       break;
     Value slot = turn.uniform[value] = createSlot(value.getType());
     storeSlot(getUniform(value), slot, start);
@@ -285,7 +283,7 @@ void IterationWriter::writeTurns(Value bits,
 //===----------------------------------------------------------------------===//
 
 void IterationWriter::writeSerial(Operation *first, Operation *last) {
-  Turn turn = prepareTurn(first, last, /*isDeferred=*/false);
+  Turn turn = prepareTurn(first, last, /*isLate=*/false);
   SmallVector<Value> outputs = findOutputs(turn.ops);
   llvm::DenseMap<Value, Value> slots;
   for (Value output : outputs)
@@ -308,9 +306,9 @@ void IterationWriter::writeSerial(Operation *first, Operation *last) {
 void IterationWriter::writeOrdered(const OrderedGroup &group) {
   for (Operation *op : lanes.findMovable(group.getOperations()))
     writeOperation(op);
-  if (!group.deferred)
+  if (!group.late)
     return writeSerial(group.first, group.last);
-  Turn turn = prepareTurn(group.first, group.last, /*isDeferred=*/true);
+  Turn turn = prepareTurn(group.first, group.last, /*isLate=*/true);
   turn.mask = masks.lookup(group.first);
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   Value bits = getBits(active);
@@ -318,11 +316,11 @@ void IterationWriter::writeOrdered(const OrderedGroup &group) {
     bits = arith::SelectOp::create(builder, loc, *counted, bits,
                                    zeros(bits.getType()));
   storeSlot(bits, turn.mask, start);
-  deferred.push_back(std::move(turn));
+  late.push_back(std::move(turn));
 }
 
 //===----------------------------------------------------------------------===//
-// Behind all
+// After all
 //===----------------------------------------------------------------------===//
 
 std::optional<Value> IterationWriter::writeIsCounted(const Turn &turn) {
@@ -341,31 +339,30 @@ void IterationWriter::createMasks() {
   Type word = getWord();
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (const OrderedGroup &group : lanes.getGroups()) {
-    if (!group.deferred)
+    if (!group.late)
       continue;
     Value mask = masks[group.first] = createSlot(word);
     storeSlot(zeros(word), mask, start);
   }
 }
 
-void IterationWriter::writeDeferredTurns(ArrayRef<Turn> deferred) {
-  if (deferred.empty())
+void IterationWriter::writeLateTurns(ArrayRef<Turn> late) {
+  if (late.empty())
     return;
   Type word = getWord();
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   SmallVector<Value> bits;
   Value all;
-  for (const Turn &turn : deferred) {
+  for (const Turn &turn : late) {
     bits.push_back(loadSlot(turn.mask, start, word));
     all = all ? arith::OrIOp::create(builder, loc, all, bits.back())
               : bits.back();
   }
-  if (deferred.size() == 1)
-    return writeTurns(all,
-                      [&](Value lane) { writeTurn(deferred.front(), lane); });
+  if (late.size() == 1)
+    return writeTurns(all, [&](Value lane) { writeTurn(late.front(), lane); });
   writeTurns(all, [&](Value lane) {
     Value shift = arith::IndexCastUIOp::create(builder, loc, word, lane);
-    for (auto [turn, mask] : llvm::zip(deferred, bits)) {
+    for (auto [turn, mask] : llvm::zip(late, bits)) {
       Value bit = arith::TruncIOp::create(
           builder, loc, builder.getI1Type(),
           arith::ShRUIOp::create(builder, loc, mask, shift));

@@ -109,7 +109,7 @@ void IterationWriter::writeOperation(Operation *op) {
     return writeVector(op);
   case LaneForm::Access:
     return writeAccess(op);
-  case LaneForm::Private: // made in front of the loop
+  case LaneForm::Private: // made before the loop
     return;
   case LaneForm::Barrier:
     return writeBarrier(op);
@@ -128,12 +128,12 @@ void IterationWriter::writeOperation(Operation *op) {
 }
 
 void IterationWriter::writeUniform(Operation *op) {
-  if (!isa<memref::AllocaOp>(op)) // made in front of the loop
+  if (!isa<memref::AllocaOp>(op)) // made before the loop
     builder.clone(*op, scalars);
 }
 
 /// A product of a number that grows by one from lane to lane and of one that is
-/// the same for all: what is added from lane to lane is known in front of loops
+/// the same for all: what is added from lane to lane is known before loops
 /// over rows, and 64-bit products of vectors take long.
 bool IterationWriter::writeLinearProduct(arith::MulIOp product) {
   Value number = product.getLhs(), factor = product.getRhs();
@@ -371,7 +371,7 @@ void IterationWriter::writeArrayAccess(Operation *op) {
     return;
   }
   Value base = getUniform(array);
-  bool isRow = !paired && lanes.isLinear(index); // one behind the other
+  bool isRow = !paired && lanes.isLinear(index); // one after the other
   Value at = isRow ? getFirst(index) : get(index);
   VectorType lanesType =
       getVectorType(cast<MemRefType>(base.getType()).getElementType());

@@ -22,7 +22,7 @@ public:
       : lanes(lanes), laneCount(lanes.getLaneCount()), loop(lanes.getLoop()),
         loc(loop.getLoc()), builder(loop) {}
 
-  /// Writes the loop in front of the builder's place.
+  /// Writes the loop before the builder's place.
   void write(mlir::OpBuilder::InsertPoint place);
   /// The loops over lanes, each of which has what one lane does alone.
   llvm::ArrayRef<mlir::scf::WhileOp> getTurnLoops() const { return turnLoops; }
@@ -138,7 +138,7 @@ private:
   mlir::Value number(int64_t value);
   void writeWhile(mlir::scf::WhileOp inner);
   void writeVaryingWhile(mlir::scf::WhileOp inner);
-  /// What a region yields for these lanes, behind a branch around it, as
+  /// What a region yields for these lanes, under a branch around it, as
   /// results `like` these are carried.
   llvm::SmallVector<mlir::Value>
   writeSide(mlir::Region &region, mlir::Value mask, mlir::ValueRange like);
@@ -155,21 +155,20 @@ private:
   Staged &getStaged(AtomicOp atomic);
   void writeStaged(AtomicOp atomic);
   void writeFlush(AtomicOp atomic, const Staged &list, mlir::Value count);
-  /// Behind the loop.
+  /// After the loop.
   void writeLastFlushes();
 
   // Lane by lane.
   /// What one lane does, and where it finds what that takes.
   struct Turn {
     llvm::SmallVector<mlir::Operation *> ops;
-    llvm::SmallVector<mlir::Operation *> made; ///< again, in front of them
+    llvm::SmallVector<mlir::Operation *> made; ///< again, before them
     llvm::MapVector<mlir::Value, mlir::Value> varying, uniform; ///< slots
     llvm::MapVector<mlir::Operation *, mlir::Value> records;    ///< memory
-    mlir::Value mask; ///< of what is deferred: a slot of the lanes' bits
+    mlir::Value mask; ///< of what is late: a slot of the lanes' bits
   };
   /// Keeps what [first, last] takes.
-  Turn prepareTurn(mlir::Operation *first, mlir::Operation *last,
-                   bool isDeferred);
+  Turn prepareTurn(mlir::Operation *first, mlir::Operation *last, bool isLate);
   mlir::IRMapping writeTurn(const Turn &turn, mlir::Value lane);
   /// A loop over lanes, given by a bit for each.
   void writeTurns(mlir::Value bits,
@@ -181,14 +180,14 @@ private:
   void writeSerial(mlir::Operation *first, mlir::Operation *last);
   void writeOrdered(const OrderedGroup &group);
   void createMasks();
-  void writeDeferred();
-  void writeDeferredTurns(llvm::ArrayRef<Turn> deferred);
+  void writeLate();
+  void writeLateTurns(llvm::ArrayRef<Turn> late);
   /// Whether the writers count primitives, of a turn that only goes to the next
   /// one.
   std::optional<mlir::Value> writeIsCounted(const Turn &turn);
   void useColumns(mlir::Operation *copy, mlir::Value lane);
 
-  // Emissions of all lanes, behind all.
+  // Emissions of all lanes, after all.
   void writeEmissions(const PortEmissions &port);
   mlir::Value writeAreFew();
   /// The turn that emits a record.
@@ -213,13 +212,13 @@ private:
   mlir::scf::ForOp loop;
   mlir::Location loc;
   mlir::OpBuilder builder;
-  mlir::Operation *outermost = nullptr; ///< Arrays stand in front of it.
+  mlir::Operation *outermost = nullptr; ///< Arrays stand before it.
   mlir::IRMapping vectors, scalars, firsts;
   llvm::DenseMap<mlir::Value, mlir::Value> columns; ///< of private arrays
   mlir::Value active;
   bool paired = false; ///< Lanes are not the loop's turns, one after the other.
   llvm::DenseMap<mlir::Operation *, mlir::Value> masks; ///< of groups: slots
-  llvm::SmallVector<Turn> deferred;
+  llvm::SmallVector<Turn> late;
   llvm::MapVector<mlir::Operation *, Staged> staged;
   llvm::SmallVector<mlir::scf::WhileOp> turnLoops;
 };

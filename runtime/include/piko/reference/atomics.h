@@ -14,11 +14,11 @@
 namespace piko {
 namespace reference {
 
-inline void expectUnordered(const char *what, const Place &at) {
+inline void expectUnordered(const char *what, const SourcePlace &at) {
   Executor *executor = Executor::current();
   if (!executor || !executor->frame)
     throw Error(std::string(what) + " outside a running pipeline");
-  Frame &call = *executor->frame;
+  CallFrame &call = *executor->frame;
   call.at = at;
   if (!call.node->unordered)
     call.node->fail(call.bin, std::string("expected the stage to be unordered, "
@@ -37,7 +37,8 @@ concept AtomicFloat = std::is_same_v<T, float> || std::is_same_v<T, double>;
 
 /// Replaces a place in a buffer or an image by f of it; returns the old value.
 /// Pixels are read through const references, but their storage is not const.
-template <class T, class F> T exchange(const T &place, const Place &at, F f) {
+template <class T, class F>
+T exchange(const T &place, const SourcePlace &at, F f) {
   auto change = [&] {
     T old = place;
     const_cast<T &>(place) = f(old);
@@ -63,12 +64,13 @@ template <class T> T wrappingAdd(T a, T b) {
 #define PIKO_ATOMIC(NAME, EXPRESSION)                                          \
   template <reference::AtomicInteger T>                                        \
   void NAME(const T &place, std::type_identity_t<T> value,                     \
-            reference::Place at = reference::Place::current()) {               \
+            reference::SourcePlace at = reference::SourcePlace::current()) {   \
     reference::exchange(place, at, [&](T old) -> T { return EXPRESSION; });    \
   }                                                                            \
   template <reference::AtomicInteger T>                                        \
   T NAME##Fetch(const T &place, std::type_identity_t<T> value,                 \
-                reference::Place at = reference::Place::current()) {           \
+                reference::SourcePlace at =                                    \
+                    reference::SourcePlace::current()) {                       \
     reference::expectUnordered("the result of an atomic", at);                 \
     return reference::exchange(place, at,                                      \
                                [&](T old) -> T { return EXPRESSION; });        \
@@ -89,7 +91,7 @@ PIKO_ATOMIC(atomicXor, old ^ value)
 /// Adds to a float; only in a stage that is Unordered.
 template <reference::AtomicFloat T>
 void atomicAdd(const T &place, std::type_identity_t<T> value,
-               reference::Place at = reference::Place::current()) {
+               reference::SourcePlace at = reference::SourcePlace::current()) {
   reference::expectUnordered("a float atomic", at);
   reference::exchange(place, at, [&](T old) { return old + value; });
 }

@@ -16,7 +16,7 @@
 namespace piko::reference {
 
 /// The executor, which is at a call of the language.
-inline Executor &executorAt(const char *what, const Place &at) {
+inline Executor &executorAt(const char *what, const SourcePlace &at) {
   Executor *running = Executor::current();
   if (!running || !running->frame)
     throw Error(std::string(what) + " outside a running pipeline");
@@ -24,35 +24,35 @@ inline Executor &executorAt(const char *what, const Place &at) {
   return *running;
 }
 /// The same, outside parallelFor.
-inline Executor &frameOutsideLoop(const char *what, const Place &at) {
+inline Executor &frameOutsideLoop(const char *what, const SourcePlace &at) {
   Executor &running = executorAt(what, at);
-  const Frame &call = *running.frame;
+  const CallFrame &call = *running.frame;
   if (call.loop)
     call.node->fail(call.bin,
                     std::string("expected ") + what + " outside a parallelFor");
   return running;
 }
-inline Frame &frameAt(const char *what, const Place &at) {
+inline CallFrame &frameAt(const char *what, const SourcePlace &at) {
   return *executorAt(what, at).frame;
 }
-inline Frame &frameInBin(const char *what, const Place &at) {
-  Frame &call = frameAt(what, at);
+inline CallFrame &frameInBin(const char *what, const SourcePlace &at) {
+  CallFrame &call = frameAt(what, at);
   if (call.phase == Phase::Assign)
     call.node->fail(-1, std::string(what) + " in assignBin");
   return call;
 }
-inline Frame &frameInSchedule(const char *what, const Place &at) {
+inline CallFrame &frameInSchedule(const char *what, const SourcePlace &at) {
   return executorAt(what, at).expect(Phase::Schedule, what);
 }
-inline Frame &frameInList(const char *what, const Place &at) {
-  Frame &call = frameInSchedule(what, at);
+inline CallFrame &frameInList(const char *what, const SourcePlace &at) {
+  CallFrame &call = frameInSchedule(what, at);
   if (!call.node->takesList)
     call.node->fail(call.bin, std::string("expected ") + what +
                                   " only in a stage that takes a list");
   return call;
 }
 
-template <class T> void emit(const T &value, int port, const Place &at) {
+template <class T> void emit(const T &value, int port, const SourcePlace &at) {
   Executor &running = executorAt("emit", at);
   if (const char *field = findUnwritten(value))
     running.frame->node->fail(running.frame->bin,
@@ -63,10 +63,10 @@ template <class T> void emit(const T &value, int port, const Place &at) {
 /// Assigns those bins that a box of cells touches for which `touches` is true
 /// of their place in the grid.
 template <class F>
-void assignBoxIf(const char *what, Cell lo, Cell hi, int rank, const Place &at,
-                 F touches) {
+void assignBoxIf(const char *what, Cell lo, Cell hi, int rank,
+                 const SourcePlace &at, F touches) {
   Executor &running = executorAt(what, at);
-  const Grid &grid = running.expect(Phase::Assign, what).node->grid;
+  const BinGrid &grid = running.expect(Phase::Assign, what).node->grid;
   Cell first{}, last{};
   for (int d = 0; d < 4; ++d) {
     lo[d] = d < rank ? std::max<int64_t>(lo[d], 0) : 0;
@@ -86,9 +86,9 @@ void assignBoxIf(const char *what, Cell lo, Cell hi, int rank, const Place &at,
 }
 
 inline void assignBox(const Cell &lo, const Cell &hi, int rank,
-                      const Place &at) {
+                      const SourcePlace &at) {
   assignBoxIf("assignToBoundingBox", lo, hi, rank, at,
-              [](const Grid &, const Cell &) { return true; });
+              [](const BinGrid &, const Cell &) { return true; });
 }
 
 /// Whether the segment between the middles of two cells has a point of the bin
@@ -96,7 +96,7 @@ inline void assignBox(const Cell &lo, const Cell &hi, int rank,
 /// along all other dimensions, the corners of the bin may not all be on one
 /// side of the line, in any two. Lengths are doubled, so that middles are
 /// integers.
-inline bool touchesLine(const Grid &grid, const Cell &place, const Cell &a,
+inline bool touchesLine(const BinGrid &grid, const Cell &place, const Cell &a,
                         const Cell &b, int rank) {
   __extension__ typedef __int128 Wide;
   Wide along[4], offset[4], extent[4];
@@ -117,28 +117,29 @@ inline bool touchesLine(const Grid &grid, const Cell &place, const Cell &a,
 }
 
 inline void assignLine(const Cell &a, const Cell &b, int rank,
-                       const Place &at) {
+                       const SourcePlace &at) {
   Cell lo, hi;
   for (int d = 0; d < 4; ++d) {
     lo[d] = std::min(a[d], b[d]);
     hi[d] = std::max(a[d], b[d]);
   }
   assignBoxIf("assignToLine", lo, hi, rank, at,
-              [&](const Grid &grid, const Cell &place) {
+              [&](const BinGrid &grid, const Cell &place) {
                 return touchesLine(grid, place, a, b, rank);
               });
 }
 
 /// Fails if one of the positions of an assignment is NaN.
 template <class V>
-void expectNumbers(const char *what, const V &a, const V &b, const Place &at) {
+void expectNumbers(const char *what, const V &a, const V &b,
+                   const SourcePlace &at) {
   for (int d = 0; d < V::length(); ++d)
     if (a[d] != a[d] || b[d] != b[d])
       frameAt(what, at).node->fail(
           -1, "expected positions of numbers, but got NaN");
 }
 
-inline void checkOwnPixel(const Frame &call, const Cell &at, int rank) {
+inline void checkOwnPixel(const CallFrame &call, const Cell &at, int rank) {
   Cell lo = call.node->grid.lo(call.bin);
   Cell hi = call.node->grid.hi(call.bin);
   for (int d = 0; d < rank; ++d)
@@ -150,7 +151,7 @@ inline void checkOwnPixel(const Frame &call, const Cell &at, int rank) {
 }
 
 /// Positions that are floats name the cells of a domain that is not too large.
-inline void checkExtent(const Frame &call) {
+inline void checkExtent(const CallFrame &call) {
   for (int64_t cells : call.node->grid.domain)
     if (cells > detail::maxFloatExtent)
       call.node->fail(-1, "expected at most " +
@@ -167,10 +168,10 @@ inline int64_t currentIteration() {
 /// Gathers one value of each iteration and hands out what `combine` makes of
 /// them.
 template <class T, class Result, class Combine>
-Result collective(const char *what, const Place &at, const T &value,
+Result collective(const char *what, const SourcePlace &at, const T &value,
                   Combine combine) {
   Executor &running = executorAt(what, at);
-  Loop &loop = running.loopForSync(what);
+  HopLoop &loop = running.loopForSync(what);
   bool first = loop.iteration == 0;
   if (first)
     loop.handedIn = std::vector<T>(loop.size, value);
@@ -183,7 +184,8 @@ Result collective(const char *what, const Place &at, const T &value,
 }
 
 /// In how many iterations the value is true.
-inline int64_t countIterations(const char *what, bool value, const Place &at) {
+inline int64_t countIterations(const char *what, bool value,
+                               const SourcePlace &at) {
   return collective<int64_t, int64_t>(
       what, at, value, [](const std::vector<int64_t> &values) {
         return std::count(values.begin(), values.end(), 1);
@@ -192,7 +194,7 @@ inline int64_t countIterations(const char *what, bool value, const Place &at) {
 
 /// How often f(0), ..., f(n - 1) is true.
 template <class F>
-int64_t countTrue(const char *what, int64_t n, F &f, const Place &at) {
+int64_t countTrue(const char *what, int64_t n, F &f, const SourcePlace &at) {
   int64_t total = 0;
   frameOutsideLoop(what, at).parallelFor(
       n, [&](int64_t i) { total += bool(f(static_cast<int>(i))); });

@@ -124,7 +124,7 @@ public:
   }
 
   /// A reference to an element is given to the current strand.
-  void give(Element &element, const Place &at) {
+  void give(Element &element, const SourcePlace &at) {
     checkPhase(element, AccessKind::Read, at);
     checkBypass(element, at);
     settle(element);
@@ -134,7 +134,8 @@ public:
   }
   /// The element changes while `change` runs.
   template <class F>
-  auto access(Element &element, AccessKind kind, const Place &at, F &&change) {
+  auto access(Element &element, AccessKind kind, const SourcePlace &at,
+              F &&change) {
     checkPhase(element, kind, at);
     checkBypass(element, at);
     settle(element);
@@ -163,7 +164,7 @@ public:
     }
   }
 
-  [[noreturn]] void fail(const Strand &by, const Place &at,
+  [[noreturn]] void fail(const Strand &by, const SourcePlace &at,
                          const std::string &message,
                          const std::string &more = "") const {
     const Call &call = *by.call;
@@ -213,7 +214,7 @@ private:
     current = std::move(strand);
   }
 
-  Element::Holder &hold(Element &element, const Place &at) {
+  Element::Holder &hold(Element &element, const SourcePlace &at) {
     if (element.holders.empty() || element.holders.back().strand != current) {
       element.holders.push_back({current, at});
       current->named.push_back(&element);
@@ -269,7 +270,7 @@ private:
   }
 
   void checkPhase(const Element &element, AccessKind kind,
-                  const Place &at) const {
+                  const SourcePlace &at) const {
     Phase phase = current->call->phase;
     if (phase == Phase::Process ||
         (phase == Phase::Assign && kind == AccessKind::Read))
@@ -286,12 +287,12 @@ private:
   }
 
   void checkWritten(const Element &element, const Strand &by,
-                    const Place &at) const {
+                    const SourcePlace &at) const {
     if (const char *field = element.memory->findUnwritten(element.bytes()))
       fail(by, at, unwrittenText(field, element.memory->elementType));
   }
 
-  void checkBypass(const Element &element, const Place &at) const {
+  void checkBypass(const Element &element, const SourcePlace &at) const {
     if (element.memory == updating)
       fail(*current, at,
            "expected an update to see " + element.memory->text() +

@@ -26,23 +26,23 @@
 namespace piko::reference {
 
 /// One call of a phase.
-struct Frame {
+struct CallFrame {
   Phase phase;
   Node *node;
   int64_t bin; ///< being scheduled or processed; in Assign, the producer's bin
   const Node *producer = nullptr;           ///< Assign; null for a source
   std::vector<int64_t> *assigned = nullptr; ///< Assign
   std::vector<Emission> *kept = nullptr;    ///< Process, on a cycle
-  Loop *loop = nullptr;                     ///< the innermost parallelFor
+  HopLoop *loop = nullptr;                  ///< the innermost parallelFor
   bool updating = false;                    ///< inside update()
   Lineage lineage{};   ///< of the primitive, or of the call that collected
   int64_t emitted = 0; ///< primitives, so far
-  Place at{};          ///< of the language's call that is running
+  SourcePlace at{};    ///< of the language's call that is running
 };
 
 class Executor {
 public:
-  Frame *frame = nullptr; ///< the phase that is running
+  CallFrame *frame = nullptr; ///< the phase that is running
   int64_t loopLimit = int64_t(1) << 20;
   Checker checker;                  ///< used in checking mode
   std::vector<NumberField> numbers; ///< fields that must not be NaN
@@ -69,7 +69,7 @@ public:
       node.waitsOn.clear();
       node.endsBin = node.unordered = false;
       node.precision = Precision::Strict;
-      Frame call{.phase = Phase::Schedule, .node = &node, .bin = bin};
+      CallFrame call{.phase = Phase::Schedule, .node = &node, .bin = bin};
       run(call, [&] { node.schedule(bin); });
       expectSame(std::is_permutation(node.waitsOn.begin(), node.waitsOn.end(),
                                      waitsOn.begin(), waitsOn.end()),
@@ -119,7 +119,7 @@ public:
   }
 
   void emit(int port, const TypeInfo *type, const void *primitive) {
-    Frame &call = expect(Phase::Process, "emit");
+    CallFrame &call = expect(Phase::Process, "emit");
     Node &node = *call.node;
     if (call.updating)
       node.fail(call.bin, "expected emit outside an update");
@@ -154,7 +154,7 @@ public:
   }
 
   void assignBin(int64_t bin) {
-    Frame &call = expect(Phase::Assign, "an assign directive");
+    CallFrame &call = expect(Phase::Assign, "an assign directive");
     int64_t bins = call.node->grid.bins();
     if (bin < 0 || bin >= bins)
       call.node->fail(-1, "expected a bin id in [0, " + std::to_string(bins) +
@@ -164,7 +164,7 @@ public:
 
   /// Runs a parallelFor of the current Process.
   void parallelFor(int64_t size, std::function<void(int64_t)> body) {
-    Frame &call = expect(Phase::Process, "parallelFor");
+    CallFrame &call = expect(Phase::Process, "parallelFor");
     if (call.updating)
       call.node->fail(call.bin, "expected parallelFor outside an update");
     if constexpr (checking)
@@ -174,9 +174,9 @@ public:
         body(i);
         checker.endIteration();
       };
-    Loop loop(call.loop, *call.node, call.bin, size, std::move(body));
+    HopLoop loop(call.loop, *call.node, call.bin, size, std::move(body));
     struct Restore {
-      Loop *&slot, *saved;
+      HopLoop *&slot, *saved;
       ~Restore() { slot = saved; }
     } restore{call.loop, call.loop};
     call.loop = &loop;
@@ -190,7 +190,7 @@ public:
   }
 
   void sync(const Barrier &barrier) {
-    Loop &loop = loopForSync(barrier.call.data());
+    HopLoop &loop = loopForSync(barrier.call.data());
     if constexpr (!checking) {
       loop.sync(barrier);
     } else {
@@ -201,8 +201,8 @@ public:
   }
 
   /// The loop that a barrier or a collective operation belongs to.
-  Loop &loopForSync(const char *what) {
-    Frame &call = expect(Phase::Process, what);
+  HopLoop &loopForSync(const char *what) {
+    CallFrame &call = expect(Phase::Process, what);
     if (!call.loop)
       call.node->fail(call.bin, std::string("expected ") + what +
                                     " inside a parallelFor");
@@ -216,7 +216,7 @@ public:
   }
 
   /// The running call, which must be of the given phase.
-  Frame &expect(Phase phase, const char *what) {
+  CallFrame &expect(Phase phase, const char *what) {
     static constexpr const char *names[] = {"assignBin", "schedule", "process"};
     if (!frame)
       throw Error(std::string(what) + " outside a running pipeline");
@@ -232,8 +232,8 @@ private:
   /// Makes a call the running one for a scope.
   struct Enter {
     Executor &executor;
-    Frame *saved;
-    Enter(Executor &executor, Frame &call)
+    CallFrame *saved;
+    Enter(Executor &executor, CallFrame &call)
         : executor(executor), saved(executor.frame) {
       executor.frame = &call;
     }
@@ -242,7 +242,7 @@ private:
 
   /// Calls a phase. A division is no call of the language, so that its place is
   /// not known.
-  template <class F> static void guard(Frame &call, F &phase) {
+  template <class F> static void guard(CallFrame &call, F &phase) {
     try {
       DivisionTrap::guard(phase);
     } catch (const NoQuotient &) {
@@ -254,7 +254,7 @@ private:
   }
 
   /// Runs a call of a phase.
-  template <class F> void run(Frame &call, F phase) {
+  template <class F> void run(CallFrame &call, F phase) {
     Enter enter(*this, call);
     if constexpr (!checking) {
       guard(call, phase);
@@ -273,7 +273,7 @@ private:
   }
 
   /// The lineage of the next primitive that a call emits.
-  static Lineage stepFrom(Frame &call) {
+  static Lineage stepFrom(CallFrame &call) {
     return makeStep(call.lineage, call.node->name(), call.bin, call.emitted++);
   }
 
@@ -281,12 +281,12 @@ private:
                               const Node *producer, int64_t producerBin,
                               const Lineage &lineage) {
     std::vector<int64_t> bins;
-    Frame call{.phase = Phase::Assign,
-               .node = &to,
-               .bin = producerBin,
-               .producer = producer,
-               .assigned = &bins,
-               .lineage = lineage};
+    CallFrame call{.phase = Phase::Assign,
+                   .node = &to,
+                   .bin = producerBin,
+                   .producer = producer,
+                   .assigned = &bins,
+                   .lineage = lineage};
     run(call, [&] { to.assign(primitive); });
     std::sort(bins.begin(), bins.end());
     bins.erase(std::unique(bins.begin(), bins.end()), bins.end());
@@ -295,11 +295,11 @@ private:
 
   void process(Node &node, int64_t bin, const std::byte *primitive,
                Lineage lineage, std::vector<Emission> *kept) {
-    Frame call{.phase = Phase::Process,
-               .node = &node,
-               .bin = bin,
-               .kept = kept,
-               .lineage = std::move(lineage)};
+    CallFrame call{.phase = Phase::Process,
+                   .node = &node,
+                   .bin = bin,
+                   .kept = kept,
+                   .lineage = std::move(lineage)};
     run(call, [&] { node.process(primitive); });
   }
 
@@ -371,7 +371,7 @@ private:
       int64_t batch = schedule.batch ? schedule.batch : count;
       int64_t begin = 0;
       do {
-        Frame call{.phase = Phase::Process, .node = &node, .bin = bin};
+        CallFrame call{.phase = Phase::Process, .node = &node, .bin = bin};
         if (batch > 0)
           call.lineage = makeStep(nullptr, node.name(), bin, begin / batch);
         run(call, [&] {
@@ -388,8 +388,8 @@ private:
                        [](const auto &list) { return !list.empty(); });
   }
 
-  std::vector<Emission> *keeperOf(Frame &call) {
-    for (Loop *loop = call.loop; loop; loop = loop->outer)
+  std::vector<Emission> *keeperOf(CallFrame &call) {
+    for (HopLoop *loop = call.loop; loop; loop = loop->outer)
       if (std::vector<Emission> *keeper = loop->keeper())
         return keeper;
     return call.kept;

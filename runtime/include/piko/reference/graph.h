@@ -67,7 +67,7 @@ public:
   bool takesList = false;
 
   // Set anew for each run.
-  Grid grid;
+  BinGrid grid;
   std::vector<BinSchedule> schedules;    ///< one for each bin
   std::vector<const TypeInfo *> waitsOn; ///< endStage
   bool endsBin = false;                  ///< endBin

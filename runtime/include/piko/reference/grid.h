@@ -53,13 +53,13 @@ inline std::string toText(const Cell &cell, int rank) {
 /// The most cells of a domain in a dimension, as pikort_set_domain has it.
 inline constexpr int64_t maxExtent = 1073741824;
 
-struct Grid {
+struct BinGrid {
   Cell domain{1, 1, 1, 1};
   Cell size{1, 1, 1, 1};  ///< cells of a bin
   Cell count{1, 1, 1, 1}; ///< bins of the grid
 
-  Grid() = default;
-  Grid(const Cell &domain, const Cell &binSize) : domain(domain) {
+  BinGrid() = default;
+  BinGrid(const Cell &domain, const Cell &binSize) : domain(domain) {
     for (int d = 0; d < 4; ++d) {
       size[d] = binSize[d] ? binSize[d] : domain[d];
       count[d] = (domain[d] + size[d] - 1) / size[d];

@@ -22,11 +22,11 @@ namespace piko::reference {
 #ifdef PIKO_CHECK
 inline constexpr bool checking = true;
 /// A place in the user's file: the default argument of the language's calls.
-using Place = std::source_location;
+using SourcePlace = std::source_location;
 #else
 inline constexpr bool checking = false;
-struct Place {
-  static constexpr Place current() { return {}; }
+struct SourcePlace {
+  static constexpr SourcePlace current() { return {}; }
 };
 #endif
 
@@ -83,7 +83,7 @@ inline std::string toText(const Lineage &lineage) {
 }
 
 /// The lines that follow a message: "\n  at file:line\n  lineage: ...".
-inline std::string contextText([[maybe_unused]] const Place &at,
+inline std::string contextText([[maybe_unused]] const SourcePlace &at,
                                const Lineage &lineage,
                                const std::string &prefix = "") {
   std::string text;

@@ -33,11 +33,11 @@ struct Emission {
   std::vector<std::byte> primitive;
 };
 
-class Loop {
+class HopLoop {
 public:
   /// Of a call of Process for `node` and `bin`.
-  Loop(Loop *outer, const Node &node, int64_t bin, int64_t size,
-       std::function<void(int64_t)> body)
+  HopLoop(HopLoop *outer, const Node &node, int64_t bin, int64_t size,
+          std::function<void(int64_t)> body)
       : outer(outer), size(size), node(node), bin(bin), body(std::move(body)) {}
 
   /// Runs all iterations. `deliver` takes what iterations emitted while their
@@ -86,7 +86,7 @@ public:
     return running ? &kept[iteration - 1] : nullptr;
   }
 
-  Loop *const outer;
+  HopLoop *const outer;
   const int64_t size;
   int64_t iteration = 0;
   std::any handedIn; ///< what iterations hand in to a collective operation

@@ -354,7 +354,7 @@ inline void Pipeline::prepareState() {
 inline std::vector<Component> Pipeline::prepareStages() {
   std::vector<Node *> declared;
   for (const auto &node : nodes) {
-    node->grid = Grid(domainExtent, node->binSize);
+    node->grid = BinGrid(domainExtent, node->binSize);
     executor.scheduleBins(*node);
     declared.push_back(node.get());
   }

@@ -22,7 +22,7 @@ enum class AccessKind { Read, Store, Update, Atomic };
 struct Access {
   AccessKind kind;
   std::shared_ptr<const Strand> by;
-  Place at;
+  SourcePlace at;
 };
 
 /// "'depth'", or without a name "an image of 'float'".
@@ -97,7 +97,7 @@ struct Element {
   /// A strand that was given a reference.
   struct Holder {
     std::shared_ptr<Strand> strand;
-    Place at;
+    SourcePlace at;
     int64_t reads = 0;    ///< references given, less the atomics made of them
     bool changed = false; ///< stored or updated by this strand
   };

@@ -79,22 +79,23 @@ public:
   // Any phase.
 
   /// The bin that holds a position or a cell; BinId{-1} outside the domain.
-  BinId
-  binFromPosition(const Position<B::rank> &p,
-                  reference::Place at = reference::Place::current()) const {
-    const reference::Frame &call = reference::frameAt("binFromPosition", at);
+  BinId binFromPosition(
+      const Position<B::rank> &p,
+      reference::SourcePlace at = reference::SourcePlace::current()) const {
+    const reference::CallFrame &call =
+        reference::frameAt("binFromPosition", at);
     reference::checkExtent(call);
     return {call.node->grid.binAt(reference::toCell(p))};
   }
-  BinId
-  binFromPosition(const Cells<B::rank> &p,
-                  reference::Place at = reference::Place::current()) const {
+  BinId binFromPosition(
+      const Cells<B::rank> &p,
+      reference::SourcePlace at = reference::SourcePlace::current()) const {
     return {reference::frameAt("binFromPosition", at)
                 .node->grid.binAt(reference::toCell(p))};
   }
   /// The extent of the domain in cells.
   Cells<B::rank>
-  domain(reference::Place at = reference::Place::current()) const {
+  domain(reference::SourcePlace at = reference::SourcePlace::current()) const {
     return reference::fromCell<B::rank>(
         reference::frameAt("domain", at).node->grid.domain);
   }
@@ -102,55 +103,58 @@ public:
   // Schedule and Process.
 
   /// The bin that is scheduled or processed.
-  BinId bin(reference::Place at = reference::Place::current()) const {
+  BinId
+  bin(reference::SourcePlace at = reference::SourcePlace::current()) const {
     return {reference::frameInBin("bin", at).bin};
   }
   /// Its first cell, and one past its last cell.
   Cells<B::rank>
-  binLo(reference::Place at = reference::Place::current()) const {
-    const reference::Frame &call = reference::frameInBin("binLo", at);
+  binLo(reference::SourcePlace at = reference::SourcePlace::current()) const {
+    const reference::CallFrame &call = reference::frameInBin("binLo", at);
     return reference::fromCell<B::rank>(call.node->grid.lo(call.bin));
   }
   Cells<B::rank>
-  binHi(reference::Place at = reference::Place::current()) const {
-    const reference::Frame &call = reference::frameInBin("binHi", at);
+  binHi(reference::SourcePlace at = reference::SourcePlace::current()) const {
+    const reference::CallFrame &call = reference::frameInBin("binHi", at);
     return reference::fromCell<B::rank>(call.node->grid.hi(call.bin));
   }
 
   // Positions and cells as braced lists of numbers.
 
   template <class T>
-  BinId
-  binFromPosition(const T (&p)[B::rank],
-                  reference::Place at = reference::Place::current()) const {
+  BinId binFromPosition(
+      const T (&p)[B::rank],
+      reference::SourcePlace at = reference::SourcePlace::current()) const {
     return binFromPosition(detail::pointOf(p), at);
   }
   template <class T>
-  void assignToBoundingBox(const In &in, const T (&lo)[B::rank],
-                           const T (&hi)[B::rank],
-                           reference::Place at = reference::Place::current()) {
+  void assignToBoundingBox(
+      const In &in, const T (&lo)[B::rank], const T (&hi)[B::rank],
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi), at);
   }
   template <class T>
-  void assignToLine(const In &in, const T (&a)[B::rank], const T (&b)[B::rank],
-                    reference::Place at = reference::Place::current()) {
+  void
+  assignToLine(const In &in, const T (&a)[B::rank], const T (&b)[B::rank],
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     assignToLine(in, detail::pointOf(a), detail::pointOf(b), at);
   }
 
   // If they are of several types: floats.
-  BinId
-  binFromPosition(const float (&p)[B::rank],
-                  reference::Place at = reference::Place::current()) const {
+  BinId binFromPosition(
+      const float (&p)[B::rank],
+      reference::SourcePlace at = reference::SourcePlace::current()) const {
     return binFromPosition(detail::pointOf(p), at);
   }
-  void assignToBoundingBox(const In &in, const float (&lo)[B::rank],
-                           const float (&hi)[B::rank],
-                           reference::Place at = reference::Place::current()) {
+  void assignToBoundingBox(
+      const In &in, const float (&lo)[B::rank], const float (&hi)[B::rank],
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     assignToBoundingBox(in, detail::pointOf(lo), detail::pointOf(hi), at);
   }
-  void assignToLine(const In &in, const float (&a)[B::rank],
-                    const float (&b)[B::rank],
-                    reference::Place at = reference::Place::current()) {
+  void
+  assignToLine(const In &in, const float (&a)[B::rank],
+               const float (&b)[B::rank],
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     assignToLine(in, detail::pointOf(a), detail::pointOf(b), at);
   }
 
@@ -180,20 +184,22 @@ public:
 
   // AssignBin. A primitive goes to the set of all bins that are named.
 
-  void assignToBin(const In &, BinId bin,
-                   reference::Place at = reference::Place::current()) {
+  void
+  assignToBin(const In &, BinId bin,
+              reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::executorAt("assignToBin", at).assignBin(bin.index);
   }
-  void assignToAll(const In &,
-                   reference::Place at = reference::Place::current()) {
+  void
+  assignToAll(const In &,
+              reference::SourcePlace at = reference::SourcePlace::current()) {
     int64_t bins = reference::frameAt("assignToAll", at).node->grid.bins();
     for (int64_t bin = 0; bin < bins; ++bin)
       reference::executorAt("assignToAll", at).assignBin(bin);
   }
   /// To the bin in which the producer emitted it.
-  void assignToPreviousBins(const In &,
-                            reference::Place at = reference::Place::current()) {
-    reference::Frame &call =
+  void assignToPreviousBins(const In &, reference::SourcePlace at =
+                                            reference::SourcePlace::current()) {
+    reference::CallFrame &call =
         reference::executorAt("assignToPreviousBins", at)
             .expect(reference::Phase::Assign, "assignToPreviousBins");
     if (!call.producer)
@@ -206,30 +212,31 @@ public:
   }
   /// To all bins that a closed box of cells touches; outside the domain there
   /// are none.
-  void assignToBoundingBox(const In &, const Cells<B::rank> &lo,
-                           const Cells<B::rank> &hi,
-                           reference::Place at = reference::Place::current()) {
+  void assignToBoundingBox(
+      const In &, const Cells<B::rank> &lo, const Cells<B::rank> &hi,
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::assignBox(reference::toCell(lo), reference::toCell(hi), B::rank,
                          at);
   }
-  void assignToBoundingBox(const In &, const Position<B::rank> &lo,
-                           const Position<B::rank> &hi,
-                           reference::Place at = reference::Place::current()) {
+  void assignToBoundingBox(
+      const In &, const Position<B::rank> &lo, const Position<B::rank> &hi,
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::expectNumbers("assignToBoundingBox", lo, hi, at);
     reference::assignBox(reference::toCell(lo), reference::toCell(hi), B::rank,
                          at);
   }
   /// To all bins that have a point of the segment from the middle of cell a to
   /// that of cell b.
-  void assignToLine(const In &, const Cells<B::rank> &a,
-                    const Cells<B::rank> &b,
-                    reference::Place at = reference::Place::current()) {
+  void
+  assignToLine(const In &, const Cells<B::rank> &a, const Cells<B::rank> &b,
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::assignLine(reference::toCell(a), reference::toCell(b), B::rank,
                           at);
   }
-  void assignToLine(const In &, const Position<B::rank> &a,
-                    const Position<B::rank> &b,
-                    reference::Place at = reference::Place::current()) {
+  void
+  assignToLine(const In &, const Position<B::rank> &a,
+               const Position<B::rank> &b,
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::expectNumbers("assignToLine", a, b, at);
     reference::assignLine(reference::toCell(a), reference::toCell(b), B::rank,
                           at);
@@ -237,9 +244,11 @@ public:
 
   // Schedule.
 
-  void specifySchedule(SchedulePolicy, int64_t tileSplit = 0,
-                       reference::Place at = reference::Place::current()) {
-    reference::Frame &call = reference::frameInSchedule("specifySchedule", at);
+  void specifySchedule(
+      SchedulePolicy, int64_t tileSplit = 0,
+      reference::SourcePlace at = reference::SourcePlace::current()) {
+    reference::CallFrame &call =
+        reference::frameInSchedule("specifySchedule", at);
     if (tileSplit < 0)
       call.node->fail(call.bin,
                       "expected a tile split of at least 0, but got " +
@@ -247,7 +256,7 @@ public:
   }
   /// Waits until all stages of type X are finished.
   template <class X>
-  void endStage(reference::Place at = reference::Place::current()) {
+  void endStage(reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::Node &node = *reference::frameInSchedule("endStage", at).node;
     const reference::TypeInfo *type = reference::typeOf<X>();
     if (std::find(node.waitsOn.begin(), node.waitsOn.end(), type) ==
@@ -255,35 +264,40 @@ public:
       node.waitsOn.push_back(type);
   }
   /// Waits until nothing can reach this bin any more.
-  void endBin(reference::Place at = reference::Place::current()) {
+  void endBin(reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::frameInSchedule("endBin", at).node->endsBin = true;
   }
   /// Calls a list Process with n primitives at a time.
-  void batch(int64_t n, reference::Place at = reference::Place::current()) {
-    reference::Frame &call = reference::frameInList("batch", at);
+  void batch(int64_t n,
+             reference::SourcePlace at = reference::SourcePlace::current()) {
+    reference::CallFrame &call = reference::frameInList("batch", at);
     if (n < 1)
       call.node->fail(call.bin, "expected a batch of at least 1, but got " +
                                     std::to_string(n));
     call.node->schedules[call.bin].batch = n;
   }
   /// Calls a list Process for empty bins, too.
-  void everyBin(reference::Place at = reference::Place::current()) {
-    reference::Frame &call = reference::frameInList("everyBin", at);
+  void everyBin(reference::SourcePlace at = reference::SourcePlace::current()) {
+    reference::CallFrame &call = reference::frameInList("everyBin", at);
     call.node->schedules[call.bin].everyBin = true;
   }
-  void specifyOrder(Order order,
-                    reference::Place at = reference::Place::current()) {
+  void
+  specifyOrder(Order order,
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::frameInSchedule("specifyOrder", at).node->unordered =
         order == Unordered;
   }
   /// What lanes are given, instead of what the compiler chooses.
-  void specifyLanes(Lanes, reference::Place at = reference::Place::current()) {
+  void
+  specifyLanes(Lanes,
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::frameInSchedule("specifyLanes", at);
   }
   /// How exactly a compiled pipeline computes Process. The reference executor
   /// computes strictly.
-  void specifyPrecision(Precision precision,
-                        reference::Place at = reference::Place::current()) {
+  void specifyPrecision(
+      Precision precision,
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::frameInSchedule("specifyPrecision", at).node->precision =
         precision;
   }
@@ -292,14 +306,15 @@ public:
 
   /// Sends a primitive through a port.
   void emit(const std::tuple_element_t<0, std::tuple<Out..., In>> &value,
-            int port = 0, reference::Place at = reference::Place::current())
+            int port = 0,
+            reference::SourcePlace at = reference::SourcePlace::current())
     requires(sizeof...(Out) > 0)
   {
     reference::emit(value, port, at);
   }
   template <class T>
   void emit(const T &value, int port = 0,
-            reference::Place at = reference::Place::current()) {
+            reference::SourcePlace at = reference::SourcePlace::current()) {
     static_assert((std::is_same_v<T, Out> || ...),
                   "emit of a type that no port has");
     reference::emit(value, port, at);
@@ -308,12 +323,14 @@ public:
   /// Changes a pixel of the current bin: f(pixel). The calls for one pixel are
   /// in lineage order.
   template <class T, int R, class F>
-  auto update(Image<T, R> &image,
-              const typename detail::CellArgument<R>::type &at, F &&f,
-              reference::Place place = reference::Place::current()) {
+  auto
+  update(Image<T, R> &image, const typename detail::CellArgument<R>::type &at,
+         F &&f,
+         reference::SourcePlace place = reference::SourcePlace::current()) {
     PIKO_EXPECT_UPDATE(F);
-    reference::Frame &call = reference::executorAt("update", place)
-                                 .expect(reference::Phase::Process, "update");
+    reference::CallFrame &call =
+        reference::executorAt("update", place)
+            .expect(reference::Phase::Process, "update");
     if (call.updating)
       call.node->fail(call.bin, "expected an update outside an update");
     reference::checkOwnPixel(call, reference::toCell(at), B::rank);
@@ -327,8 +344,9 @@ public:
 
   /// Calls f(0), ..., f(n - 1), which are independent of one another.
   template <class F>
-  void parallelFor(int64_t n, F &&f,
-                   reference::Place at = reference::Place::current()) {
+  void
+  parallelFor(int64_t n, F &&f,
+              reference::SourcePlace at = reference::SourcePlace::current()) {
     static_assert(std::is_invocable_v<const std::remove_reference_t<F> &, int>,
                   "expected a function that can be called if it is const: "
                   "iterations share what it has captured by value");
@@ -338,17 +356,17 @@ public:
   }
   /// Calls f(cell) for each cell of the current bin, x fastest.
   template <class F>
-  void parallelForPixels(F &&f,
-                         reference::Place at = reference::Place::current()) {
+  void parallelForPixels(
+      F &&f, reference::SourcePlace at = reference::SourcePlace::current()) {
     Cells<B::rank> lo = binLo(at), hi = binHi(at) - 1;
     parallelForPixels(lo, hi, std::forward<F>(f), at);
   }
   /// The same for the cells of the closed box from lo to hi that lie in the
   /// bin.
   template <class F>
-  void parallelForPixels(const Cells<B::rank> &lo, const Cells<B::rank> &hi,
-                         F &&f,
-                         reference::Place at = reference::Place::current()) {
+  void parallelForPixels(
+      const Cells<B::rank> &lo, const Cells<B::rank> &hi, F &&f,
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     static_assert(
         std::is_invocable_v<const std::remove_reference_t<F> &,
                             Cells<B::rank> &>,
@@ -375,8 +393,9 @@ public:
   }
   template <class F>
     requires(B::rank == 1)
-  void parallelForPixels(int lo, int hi, F &&f,
-                         reference::Place at = reference::Place::current()) {
+  void parallelForPixels(
+      int lo, int hi, F &&f,
+      reference::SourcePlace at = reference::SourcePlace::current()) {
     parallelForPixels(Cells<1>(lo), Cells<1>(hi), std::forward<F>(f), at);
   }
   template <int Rank, class T, class F>
@@ -387,25 +406,29 @@ public:
                   "expected as many dimensions as the bins of the stage have");
   }
   /// In an iteration of parallelFor: a barrier between all iterations.
-  void sync(reference::Place at = reference::Place::current()) {
+  void sync(reference::SourcePlace at = reference::SourcePlace::current()) {
     reference::executorAt("sync", at).sync({"sync"});
   }
 
   // Over the iterations of the enclosing parallelFor; each of them is also a
   // sync(). Every iteration gets the result.
 
-  bool any(bool value, reference::Place at = reference::Place::current()) {
+  bool any(bool value,
+           reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::countIterations("any", value, at) != 0;
   }
-  bool all(bool value, reference::Place at = reference::Place::current()) {
+  bool all(bool value,
+           reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::countIterations("all", !value, at) == 0;
   }
-  int64_t count(bool value, reference::Place at = reference::Place::current()) {
+  int64_t count(bool value,
+                reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::countIterations("count", value, at);
   }
   /// op over all values, in a fixed binary tree.
   template <class T, class Op>
-  T reduce(T value, Op op, reference::Place at = reference::Place::current()) {
+  T reduce(T value, Op op,
+           reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::collective<T, T>(
         "reduce", at, value, [&](const std::vector<T> &v) {
           return reference::reduceTree(v, op, T{});
@@ -415,7 +438,7 @@ public:
   /// first.
   template <class T, class Op>
   T scan(T value, Op op, T empty = T{},
-         reference::Place at = reference::Place::current()) {
+         reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::collective<T, std::vector<T>>(
         "scan", at, value, [&](const std::vector<T> &v) {
           return reference::scanTree(v, op, empty);
@@ -423,7 +446,8 @@ public:
   }
   /// Iteration r gets the index of the iteration with the r-th smallest key.
   template <class K>
-  int64_t sort(K key, reference::Place at = reference::Place::current()) {
+  int64_t sort(K key,
+               reference::SourcePlace at = reference::SourcePlace::current()) {
     static_assert(std::is_arithmetic_v<K>, "the key of sort is a number");
     return reference::collective<K, std::vector<int64_t>>(
         "sort", at, key, [](const std::vector<K> &keys) {
@@ -435,22 +459,22 @@ public:
 
   template <class F>
   bool any(int64_t n, F &&f,
-           reference::Place at = reference::Place::current()) {
+           reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::countTrue("any(n, f)", n, f, at) != 0;
   }
   template <class F>
   bool all(int64_t n, F &&f,
-           reference::Place at = reference::Place::current()) {
+           reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::countTrue("all(n, f)", n, f, at) == n;
   }
   template <class F>
   int64_t count(int64_t n, F &&f,
-                reference::Place at = reference::Place::current()) {
+                reference::SourcePlace at = reference::SourcePlace::current()) {
     return reference::countTrue("count(n, f)", n, f, at);
   }
   template <class T, class F, class Op>
   T reduce(int64_t n, F &&f, Op op, T empty,
-           reference::Place at = reference::Place::current()) {
+           reference::SourcePlace at = reference::SourcePlace::current()) {
     std::vector<T> values(n);
     reference::frameOutsideLoop("reduce(n, f)", at)
         .parallelFor(n, [&](int64_t i) { values[i] = f(static_cast<int>(i)); });

@@ -20,19 +20,19 @@ namespace piko {
 namespace reference {
 
 /// The phase that is running; null for the host.
-inline Frame *currentFrame() {
+inline CallFrame *currentFrame() {
   Executor *executor = Executor::current();
   return executor ? executor->frame : nullptr;
 }
 
 /// Throws for an index outside a list or, as `into` says, outside of state.
 [[noreturn]] inline void failIndex(int64_t index, int64_t count,
-                                   const Place &at,
+                                   const SourcePlace &at,
                                    const std::string &into = "") {
   std::string message = "expected an index " + into + "in [0, " +
                         std::to_string(count) + "), but got " +
                         std::to_string(index);
-  Frame *call = currentFrame();
+  CallFrame *call = currentFrame();
   if (!call)
     throw Error(message);
   call->at = at;
@@ -41,7 +41,7 @@ inline Frame *currentFrame() {
 /// The same for the Buffer or the Image at an address.
 [[noreturn]] inline void failAccess(const void *handle, bool isImage,
                                     std::string_view elementType, int64_t index,
-                                    int64_t count, const Place &at) {
+                                    int64_t count, const SourcePlace &at) {
   std::string into;
   if (currentFrame())
     into = "into " +
@@ -54,7 +54,7 @@ inline Frame *currentFrame() {
 /// Throws for a phase that uses a Buffer to which the host has bound nothing.
 [[noreturn]] inline void failUnbound(const void *handle,
                                      std::string_view elementType) {
-  Frame &call = *currentFrame();
+  CallFrame &call = *currentFrame();
   std::string name = Executor::current()->checker.nameOf(handle);
   call.node->fail(call.phase == Phase::Assign ? -1 : call.bin,
                   (name.empty() ? stateText(name, false, elementType)
@@ -64,7 +64,7 @@ inline Frame *currentFrame() {
 
 /// Throws if a phase makes a call that is the host's.
 inline void expectHost(const char *what) {
-  if (Frame *call = currentFrame())
+  if (CallFrame *call = currentFrame())
     call->node->fail(call->phase == Phase::Assign ? -1 : call->bin,
                      std::string("expected ") + what +
                          " on the host's side, but a phase calls it: a phase "
@@ -83,16 +83,16 @@ inline Checker *activeChecker() {
 struct Index {
   template <class Integer>
     requires std::is_convertible_v<Integer, int64_t>
-  Index(Integer value, Place at = Place::current())
+  Index(Integer value, SourcePlace at = SourcePlace::current())
       : value(static_cast<int64_t>(value)), at(at) {}
   operator int64_t() const { return value; }
   int64_t value;
-  Place at;
+  SourcePlace at;
 };
-inline Place placeOf(const Index &index) { return index.at; }
+inline SourcePlace placeOf(const Index &index) { return index.at; }
 #else
 using Index = int64_t;
-inline Place placeOf(Index) { return {}; }
+inline SourcePlace placeOf(Index) { return {}; }
 #endif
 
 /// A vector, an array or a span.
@@ -176,7 +176,7 @@ public:
     return count;
   }
   T &operator[](reference::Index i) const {
-    reference::Place at = reference::placeOf(i);
+    reference::SourcePlace at = reference::placeOf(i);
     if (!isBound)
       expectBound();
     if (i < 0 || i >= count)
@@ -248,7 +248,8 @@ public:
 
   // For both: in a phase for the elements in order, `for (T &x : buffer)`.
 
-  T *begin(reference::Place at = reference::Place::current()) const {
+  T *begin(
+      reference::SourcePlace at = reference::SourcePlace::current()) const {
     if (!isBound)
       expectBound();
     if (reference::Checker *checker = reference::activeChecker())
@@ -290,16 +291,16 @@ class Image final : public reference::ImageBase {
 public:
   Image() = default;
 
-  const T &
-  operator()(const Cells<Rank> &at,
-             reference::Place place = reference::Place::current()) const {
+  const T &operator()(
+      const Cells<Rank> &at,
+      reference::SourcePlace place = reference::SourcePlace::current()) const {
     T &found = pixel(at, place);
     if (reference::Checker *checker = reference::activeChecker())
       checker->give(element(*checker, found), place);
     return found;
   }
   void store(const Cells<Rank> &at, const T &value,
-             reference::Place place = reference::Place::current()) {
+             reference::SourcePlace place = reference::SourcePlace::current()) {
     T &found = pixel(at, place);
     auto change = [&] { found = value; };
     if (reference::Checker *checker = reference::activeChecker())
@@ -335,7 +336,8 @@ public:
 
   /// f(pixel), for BasicStage::update.
   template <class F>
-  auto update(const Cells<Rank> &at, const reference::Place &place, F &&f) {
+  auto update(const Cells<Rank> &at, const reference::SourcePlace &place,
+              F &&f) {
     T &found = pixel(at, place);
     if (reference::Checker *checker = reference::activeChecker())
       return checker->access(element(*checker, found),
@@ -348,7 +350,7 @@ private:
   int64_t countPixels() const {
     return cells[0] * cells[1] * cells[2] * cells[3];
   }
-  T &pixel(const Cells<Rank> &at, const reference::Place &place) const {
+  T &pixel(const Cells<Rank> &at, const reference::SourcePlace &place) const {
     int64_t index = 0;
     for (int d = Rank - 1; d >= 0; --d) {
       if (at[d] < 0 || at[d] >= cells[d])

@@ -3,8 +3,8 @@
 piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
 
-// Each turn of the outer loop reads the same numbers again, which are in the
-// cache: lanes share their lines' cost over all turns.
+// Each iteration of the outer loop reads the same numbers again, which are in the
+// cache: lanes share their lines' cost over all iterations.
 piko.pipeline @ReadsAgain rank 1 {
   piko.buffer @out : @D
   piko.source @a
@@ -17,7 +17,7 @@ piko.pipeline @ReadsAgain rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Row>
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -58,7 +58,7 @@ piko.pipeline @ReadsOnce rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Row>
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is not vectorized: 16 at once are expected to take}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -99,7 +99,7 @@ piko.pipeline @Chases rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Item>
     %n = piko.storage.unit_count %bins : !piko.bins<@Item>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Item>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Item>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Item> -> !piko.prim<@Item>
@@ -127,7 +127,7 @@ piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4
 
 // What a loop on one side of a condition does in place of nothing may be a slow path,
-// where all go on behind it: it is weighed as one that may run or not.
+// where all go on after it: it is weighed as one that may run or not.
 piko.pipeline @SlowPath rank 1 {
   piko.buffer @out : @D
   piko.source @a
@@ -141,7 +141,7 @@ piko.pipeline @SlowPath rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Row>
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -227,7 +227,7 @@ piko.pipeline @MainPath rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Row>
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is not vectorized: 16 at once are expected to take}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -271,7 +271,7 @@ piko.pipeline @Guards rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Row>
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>
@@ -372,7 +372,7 @@ piko.pipeline @GuardsWithWorkBehind rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@Row>
     %n = piko.storage.unit_count %bins : !piko.bins<@Row>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@Row>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@Row>
       // expected-remark@+1 {{stage 'a': process is not vectorized: 16 at once are expected to take}}
       scf.for %i = %lo to %hi step %c1 {
         %f = piko.storage.item %bins[%i] : !piko.bins<@Row> -> !piko.prim<@Row>

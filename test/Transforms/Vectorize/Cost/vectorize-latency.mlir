@@ -3,7 +3,7 @@
 piko.record @P {"x" : f32 at 0, "index" : i32 at 4} size 8 align 4
 piko.record @V {"z" : f32 at 0} size 4 align 4
 
-// A turn is a chain of products and sums that begins with what the turn before
+// An iteration is a chain of products and sums that begins with what the iteration before
 // hands on. A second vector takes its turn while the first one waits.
 // CHECK-LABEL: piko.pipeline @Chain
 // CHECK:         scf.for %{{.*}} = %c0 to %c40
@@ -20,7 +20,7 @@ piko.pipeline @Chain rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %n = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@P>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
@@ -44,7 +44,7 @@ piko.pipeline @Chain rank 1 {
 piko.record @P {"x" : f32 at 0, "index" : i32 at 4} size 8 align 4
 piko.record @V {"z" : f32 at 0} size 4 align 4
 
-// What a turn computes takes longer than the sum that it hands on: one vector.
+// What an iteration computes takes longer than the sum that it hands on: one vector.
 // CHECK-LABEL: piko.pipeline @Sum
 // CHECK-NOT:     vector<32xf32>
 piko.pipeline @Sum rank 1 {
@@ -60,7 +60,7 @@ piko.pipeline @Sum rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %n = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%u) in (%n) {
-      %lo, %hi = piko.storage.cell_range %bins[%u, %u] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%u, %u] : !piko.bins<@P>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>

@@ -2,7 +2,7 @@
 
 piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32 at 8, "d" : f64 at 16, "n" : i32 at 24} size 32 align 8
 
-// Words of the same elements are read at once, also of elements one behind the
+// Words of the same elements are read at once, also of elements one after the
 // other, and two alone if they are side by side; a field of 64 bits, and one for
 // other lanes, are not. Of state that the kernel changes, so are words that nothing
 // in between has written.
@@ -49,7 +49,7 @@ piko.pipeline @P rank 1 {
     %n3 = piko.cpu.gather @out[%is : vector<16xindex>] "n" mask %m : vector<16xi1>, vector<16xi32>
   }
 
-  // A field that fewer lanes read, behind a condition, is read along; one that
+  // A field that fewer lanes read, under a condition, is read along; one that
   // other lanes read is not.
   // CHECK-LABEL: piko.kernel @primitives
   // CHECK:         %[[P:.*]] = piko.cpu.items
@@ -95,7 +95,7 @@ piko.pipeline @P rank 1 {
     piko.cpu.scatter %n, @out[%is : vector<16xindex>] "n" mask %m : vector<16xi1>, vector<16xi32>
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
-  // So is a field of an element behind a condition, whose record is as short as a line.
+  // So is a field of an element under a condition, whose record is as short as a line.
   // CHECK-LABEL: piko.kernel @conditions
   // CHECK:         piko.cpu.get_fields %{{.*}} ["x", "y", "z"] of @V
   // CHECK-NOT:     piko.cpu.gather

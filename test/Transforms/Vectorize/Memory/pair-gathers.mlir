@@ -13,7 +13,7 @@ piko.pipeline @P rank 1 {
   piko.stage @a bins [0] threads 1 : @Number -> [] {}
 
   // An entry of a table and the next one, each tested by itself: what the second
-  // one needs is computed in front of the first one.
+  // one needs is computed before the first one.
   // CHECK-LABEL: piko.kernel @next
   // CHECK:         %[[JS:.*]] = arith.addi %[[IS:.*]], %{{.*}} : vector<16xi32>
   // CHECK:         %[[N:.*]] = arith.cmpi ult, %[[JS]]
@@ -84,7 +84,7 @@ piko.pipeline @P rank 1 {
     piko.cpu.scatter %sum, @out[%steps : vector<16xindex>] "value" mask %m : vector<16xi1>, vector<16xi32>
   }
 
-  // The turns of a loop read bytes side by side: it is unrolled, and eight of them
+  // The iterations of a loop read bytes side by side: it is unrolled, and eight of them
   // are one load for each lane. The ninth is loaded alone.
   // CHECK-LABEL: piko.kernel @turns
   // CHECK-NOT:     scf.for

@@ -1,7 +1,7 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
 
 // A loop of a phase that counts up to a number that is not its own, and stores
-// each field at most once in a turn: lanes share its turns.
+// each field at most once in an iteration: lanes share its turns.
 piko.record @V {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @InOrder
 // CHECK:         scf.for %{{.*}} = %c0 to %{{.*}} step %c16
@@ -87,7 +87,7 @@ piko.pipeline @Refused rank 1 {
 
 // -----
 
-// Turns that do nothing but what stands behind a condition, with a loop of its
+// Turns that do nothing but what stands under a condition, with a loop of its
 // own: those that have something to do are found first.
 piko.record @V {"z" : f32 at 0} size 4 align 4
 // CHECK-LABEL: piko.pipeline @Compacted

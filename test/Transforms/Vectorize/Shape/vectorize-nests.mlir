@@ -4,8 +4,8 @@ piko.record @P {"k" : i32 at 0, "n" : i32 at 4} size 8 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4
 
 // Eight searches, each of which ends when it has found something: one loop, in
-// whose turns lanes are in different searches. A search goes on, or it adds what
-// it has found, and the next one begins. A turn waits for a gather, so that two
+// whose iterations lanes are in different searches. A search goes on, or it adds what
+// it has found, and the next one begins. An iteration waits for a gather, so that two
 // vectors take turns.
 // CHECK-LABEL: piko.pipeline @Searches
 // CHECK:         scf.while
@@ -27,12 +27,12 @@ piko.pipeline @Searches rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %u = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%unit) in (%u) {
-      %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%unit, %unit] : !piko.bins<@P>
       // expected-remark@+1 {{stage 'a': process is vectorized for 32 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
         %k = piko.get %p "k" : !piko.prim<@P> -> i32
-        // expected-note@+1 {{lanes go on in this loop each by itself, however often the loop inside turns}}
+        // expected-note@+1 {{lanes go on in this loop each by itself, however often the loop inside iterates}}
         %all:2 = scf.while (%sum = %c0, %x = %c0) : (i32, i32) -> (i32, i32) {
           %more = arith.cmpi slt, %x, %c8 : i32
           scf.condition(%more) %sum, %x : i32, i32
@@ -67,7 +67,7 @@ piko.pipeline @Searches rank 1 {
 piko.record @P {"k" : i32 at 0, "n" : i32 at 4} size 8 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4
 
-// Loops whose ends are a fixed number of turns from where they begin do not
+// Loops whose ends are a fixed number of iterations from where they begin do not
 // differ: only the loop around them does.
 // CHECK-LABEL: piko.pipeline @Alike
 // CHECK:         scf.while
@@ -87,7 +87,7 @@ piko.pipeline @Alike rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %u = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%unit) in (%u) {
-      %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%unit, %unit] : !piko.bins<@P>
       // expected-remark@+2 {{stage 'a': process is vectorized for 16 primitives at once}}
       // expected-note@+1 {{lanes go on in this loop each by itself}}
       scf.for %i = %lo to %hi step %step {
@@ -134,7 +134,7 @@ piko.pipeline @Ordered rank 1 {
     %bins = piko.storage.open_bins @a : !piko.bins<@P>
     %u = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%unit) in (%u) {
-      %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%unit, %unit] : !piko.bins<@P>
       // expected-remark@+1 {{stage 'a': process is vectorized for 16 primitives at once}}
       scf.for %i = %lo to %hi step %step {
         %p = piko.storage.item %bins[%i] : !piko.bins<@P> -> !piko.prim<@P>
@@ -163,7 +163,7 @@ piko.record @N {"x" : f32 at 0} size 4 align 4
 // A loop by itself, long for some primitives: each lane takes every sixteenth
 // primitive, and waits with the next one until three eighths of the lanes need
 // one, or none has anything else to do. All primitives are
-// counted behind it.
+// counted after it.
 // CHECK-LABEL: piko.pipeline @Iterates
 // CHECK:         piko.cpu.items
 // CHECK:         scf.while
@@ -192,7 +192,7 @@ piko.pipeline @Iterates rank 1 {
     %u = piko.storage.unit_count %bins : !piko.bins<@P>
     scf.forall (%unit) in (%u) {
       %writer = piko.cpu.open_writer %bins[%unit] : !piko.bins<@P>
-      %lo, %hi = piko.storage.cell_range %bins[%unit, %unit] : !piko.bins<@P>
+      %lo, %hi = piko.storage.bucket_range %bins[%unit, %unit] : !piko.bins<@P>
       // expected-remark@+2 {{stage 'a': process is vectorized for 16 primitives at once}}
       // expected-note@+1 {{lanes go on in this loop each by itself}}
       scf.for %i = %lo to %hi step %c1 {

@@ -11,26 +11,26 @@
 
 namespace piko::marks {
 
-/// A loop whose turns lanes may share: over primitives or iterations.
+/// A loop whose iterations lanes may share: over primitives or iterations.
 constexpr llvm::StringLiteral lanes = "piko.lanes";
-/// A loop over rows of pixels, around one whose turns lanes may share: all of
-/// these pixels may be visited in any order.
+/// A loop over rows of pixels, around one whose iterations lanes may share: all
+/// of these pixels may be visited in any order.
 constexpr llvm::StringLiteral rows = "piko.rows";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
 /// An scf.if between the versions of a loop over primitives; they become
 /// functions where the scalar one, its second side, is one of two itself.
 constexpr llvm::StringLiteral versions = "piko.versions";
-/// How many turns lanes together are expected to make of a loop that was made
-/// of two, one inside of the other: a 64-bit float.
-constexpr llvm::StringLiteral turns = "piko.turns";
+/// How many iterations lanes together are expected to make of a loop that was
+/// made of two, one inside of the other: a 64-bit float.
+constexpr llvm::StringLiteral iterations = "piko.iterations";
 /// An scf.if whose second side a lane may put off for as long as others take
 /// the first one, which does nothing for it: in how many turns it runs, a
 /// 64-bit float.
 constexpr llvm::StringLiteral advances = "piko.advances";
 /// How probable it is that an scf.if takes its first side, or that a loop goes
-/// on for another turn, by what the text says with [[likely]] and its like: a
-/// 64-bit float from 0 to 1.
+/// on for another iteration, by what the text says with [[likely]] and its
+/// like: a 64-bit float from 0 to 1.
 constexpr llvm::StringLiteral probability = "piko.probability";
 /// How probable each region of an scf.index_switch is, the default one first,
 /// by what the text says: an array of 64-bit floats from 0 to 1.
@@ -51,8 +51,8 @@ constexpr llvm::StringLiteral threads = "piko.threads";
 constexpr llvm::StringLiteral fewest = "piko.fewest";
 /// How many threads a block of a kernel has: a 64-bit integer.
 constexpr llvm::StringLiteral blockSize = "piko.block_size";
-/// A loop whose iterations have outboxes of their own.
-constexpr llvm::StringLiteral deferred = "piko.deferred";
+/// A loop whose iterations have append buffers of their own.
+constexpr llvm::StringLiteral reordered = "piko.reordered";
 /// A loop of a kernel that is to be a function of its own: few primitives need
 /// it.
 constexpr llvm::StringLiteral rare = "piko.rare";

@@ -39,9 +39,9 @@ namespace StateAccess {
 enum Kind { reads = 1, stores = 2, changesAtomically = 4, updates = 8 };
 } // namespace StateAccess
 
-/// Of operations that only the CPU's lowering makes.
+/// Of operations below the machine level, which a target's lowering makes.
 template <typename OpT>
-class CPUOnly : public mlir::OpTrait::TraitBase<OpT, CPUOnly> {};
+class TargetLevel : public mlir::OpTrait::TraitBase<OpT, TargetLevel> {};
 
 /// Of operations that checking mode alone has.
 template <typename OpT>

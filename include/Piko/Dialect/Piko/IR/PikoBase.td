@@ -68,4 +68,9 @@ def Piko_I64Attr : TypedAttrBase<I64, "IntegerAttr",
   let constBuilderCall = "$_builder.getI64IntegerAttr($0)";
 }
 
+/// Says that an operation is below the machine level: no kernel there has it.
+def Piko_TargetLevel : NativeOpTrait<"TargetLevel"> {
+  let cppNamespace = "::piko";
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOBASE_TD

@@ -11,17 +11,12 @@ include "Piko/Dialect/Piko/IR/PikoAttributes.td"
 include "Piko/Dialect/Piko/IR/PikoInterfaces.td"
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
-/// Says that an operation is the CPU's: no kernel of the machine level has it.
-def Piko_CPUOnly : NativeOpTrait<"CPUOnly"> {
-  let cppNamespace = "::piko";
-}
-
 class Piko_CPUOp<string mnemonic, list<Trait> traits = []>
-    : Piko_Op<"cpu." # mnemonic, !listconcat([Piko_CPUOnly], traits)>;
+    : Piko_Op<"cpu." # mnemonic, !listconcat([Piko_TargetLevel], traits)>;
 
 /// How bins are stored is the runtime's business, for every target.
 class Piko_StorageOp<string mnemonic, list<Trait> traits = []>
-    : Piko_Op<"storage." # mnemonic, !listconcat([Piko_CPUOnly], traits)>;
+    : Piko_Op<"storage." # mnemonic, !listconcat([Piko_TargetLevel], traits)>;
 
 def Piko_OpenBinsOp : Piko_StorageOp<"open_bins", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
@@ -83,14 +78,14 @@ def Piko_ClearsOp : Piko_StorageOp<"clears", [Pure]> {
   let assemblyFormat = "$bins attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_UnitCellsOp : Piko_StorageOp<"unit_cells", [Pure]> {
-  let summary = "the cells of a unit of work";
+def Piko_UnitBucketsOp : Piko_StorageOp<"unit_buckets", [Pure]> {
+  let summary = "the buckets of a unit of work";
   let description = [{
     The range is half open. Of a stage that takes lists it is the calls of its
     process phase.
 
     ```mlir
-    %c0, %c1 = piko.storage.unit_cells %bins[%unit] : !piko.bins<@Fragment>
+    %c0, %c1 = piko.storage.unit_buckets %bins[%unit] : !piko.bins<@Fragment>
     ```
   }];
   let arguments = (ins Piko_BinsType:$bins, Index:$unit);
@@ -98,32 +93,32 @@ def Piko_UnitCellsOp : Piko_StorageOp<"unit_cells", [Pure]> {
   let assemblyFormat = "$bins `[` $unit `]` attr-dict `:` qualified(type($bins))";
 }
 
-def Piko_CellRangeOp : Piko_StorageOp<"cell_range", [Pure]> {
-  let summary = "the positions of a cell that a unit of work holds";
+def Piko_BucketRangeOp : Piko_StorageOp<"bucket_range", [Pure]> {
+  let summary = "the positions of a bucket that a unit of work holds";
   let description = [{
     The range is half open.
 
     ```mlir
-    %lo, %hi = piko.storage.cell_range %bins[%unit, %cell] : !piko.bins<@Fragment>
+    %lo, %hi = piko.storage.bucket_range %bins[%unit, %bucket] : !piko.bins<@Fragment>
     ```
   }];
-  let arguments = (ins Piko_BinsType:$bins, Index:$unit, Index:$cell);
+  let arguments = (ins Piko_BinsType:$bins, Index:$unit, Index:$bucket);
   let results = (outs Index:$begin, Index:$end);
   let assemblyFormat = [{
-    $bins `[` $unit `,` $cell `]` attr-dict `:` qualified(type($bins))
+    $bins `[` $unit `,` $bucket `]` attr-dict `:` qualified(type($bins))
   }];
 }
 
-def Piko_CellBinOp : Piko_StorageOp<"cell_bin", [Pure]> {
-  let summary = "the bin that a cell belongs to";
+def Piko_BucketBinOp : Piko_StorageOp<"bucket_bin", [Pure]> {
+  let summary = "the bin that a bucket belongs to";
   let description = [{
     ```mlir
-    %b = piko.storage.cell_bin %bins[%cell] : !piko.bins<@Fragment>
+    %b = piko.storage.bucket_bin %bins[%bucket] : !piko.bins<@Fragment>
     ```
   }];
-  let arguments = (ins Piko_BinsType:$bins, Index:$cell);
+  let arguments = (ins Piko_BinsType:$bins, Index:$bucket);
   let results = (outs Index:$result);
-  let assemblyFormat = "$bins `[` $cell `]` attr-dict `:` qualified(type($bins))";
+  let assemblyFormat = "$bins `[` $bucket `]` attr-dict `:` qualified(type($bins))";
 }
 
 def Piko_CallRangeOp : Piko_StorageOp<"call_range", [Pure]> {
@@ -188,7 +183,7 @@ def Piko_ItemOp : Piko_StorageOp<"item", [Pure]> {
 def Piko_PrefetchItemOp : Piko_CPUOp<"prefetch_item"> {
   let summary = "says that the primitive at a position will be read";
   let description = [{
-    A hint that changes nothing. Behind the last position it is for the last one.
+    A hint that changes nothing. After the last position it is for the last one.
     Nothing is asked for where primitives lie in the order of positions.
 
     ```mlir
@@ -229,7 +224,7 @@ def Piko_TakesVectorsOp : Piko_CPUOp<"takes_vectors", [
     the runtime measures which takes less. Loops have numbers from 0 in the
     kernel; one that is in the scalar version of another names it, `within`.
     `vectors` and `scalar` are the cycles that the versions are expected to take
-    for as many turns as there are lanes, and `expected` says that the vectors
+    for as many iterations as there are lanes, and `expected` says that the vectors
     are expected to be faster.
 
     ```mlir
@@ -253,15 +248,15 @@ def Piko_LocalBinOp : Piko_StorageOp<"local_bin", [
   let description = [{
     A local barrier: the body is the stage's, and its argument holds all that the
     port of the first writer has kept since the last time, in the order of its
-    emission, as the one unit, and the one cell, of a bin. Of a stage that takes
-    a list, the cells of the unit are the calls. It is gone at the end. What the
+    emission, as the one unit, and the one bucket, of a bin. Of a stage that takes
+    a list, the buckets of the unit are the calls. It is gone at the end. What the
     stage emits goes to the second writer.
 
     ```mlir
     %other = piko.cpu.open_writer %bins[%unit] of @plot : !piko.bins<@Fragment>
     piko.storage.local_bin @plot from %writer[0] writer %other {
     ^bb0(%local: !piko.bins<@Point>):
-      %c0, %c1 = piko.storage.unit_cells %local[%unit] : !piko.bins<@Point>
+      %c0, %c1 = piko.storage.unit_buckets %local[%unit] : !piko.bins<@Point>
       piko.storage.next %other
     }
     ```
@@ -313,7 +308,7 @@ def Piko_AppendBinOp : Piko_StorageOp<"append_bin", [
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "puts what a port emitted last into a bin";
   let description = [{
-    Where the stage's bins are divided into tiles, the tile stands behind the
+    Where the stage's bins are divided into tiles, the tile stands after the
     bin. Without a port it places the current primitive of a source. A bin
     outside the grid is an error when the pipeline runs.
 
@@ -351,7 +346,7 @@ def Piko_IsCountedOp : Piko_CPUOp<"is_counted"> {
   let description = [{
     It has where the order of what was emitted is to be found from the primitives
     that it came from. That does not change within a unit of work, except between
-    `piko.cpu.defer_begin` and `piko.cpu.defer_end`.
+    `piko.cpu.reorder_begin` and `piko.cpu.reorder_end`.
 
     ```mlir
     %counted = piko.cpu.is_counted %writer
@@ -362,36 +357,36 @@ def Piko_IsCountedOp : Piko_CPUOp<"is_counted"> {
   let assemblyFormat = "$writer attr-dict";
 }
 
-def Piko_DeferBeginOp : Piko_CPUOp<"defer_begin"> {
+def Piko_ReorderBeginOp : Piko_CPUOp<"reorder_begin"> {
   let summary = "what iterations emit is put in their order later";
   let description = [{
-    From here to `piko.cpu.defer_end`, primitives are kept for each of so many
+    From here to `piko.cpu.reorder_end`, primitives are kept for each of so many
     iterations; there they follow each other by iteration, then as they came.
 
     ```mlir
-    piko.cpu.defer_begin %writer[%n]
+    piko.cpu.reorder_begin %writer[%n]
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Index:$iterations);
   let assemblyFormat = "$writer `[` $iterations `]` attr-dict";
 }
 
-def Piko_DeferIterationOp : Piko_CPUOp<"defer_iteration"> {
+def Piko_ReorderIterationOp : Piko_CPUOp<"reorder_iteration"> {
   let summary = "all that follows comes from this iteration";
   let description = [{
     ```mlir
-    piko.cpu.defer_iteration %writer[%i]
+    piko.cpu.reorder_iteration %writer[%i]
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer, Index:$iteration);
   let assemblyFormat = "$writer `[` $iteration `]` attr-dict";
 }
 
-def Piko_DeferEndOp : Piko_CPUOp<"defer_end"> {
+def Piko_ReorderEndOp : Piko_CPUOp<"reorder_end"> {
   let summary = "emits what iterations have kept";
   let description = [{
     ```mlir
-    piko.cpu.defer_end %writer
+    piko.cpu.reorder_end %writer
     ```
   }];
   let arguments = (ins Piko_WriterType:$writer);

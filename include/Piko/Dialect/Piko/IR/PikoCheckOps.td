@@ -59,7 +59,7 @@ def Piko_CheckRecordOp : Piko_CheckOp<"record", [
   let summary = "a record with room for a lineage";
   let description = [{
     The first record is the second one, which the host knows, with one more
-    field, `piko.lineage`, behind it. Of the fields in `numbers`, or of the
+    field, `piko.lineage`, after it. Of the fields in `numbers`, or of the
     numbers that their names begin, none may be NaN.
 
     ```mlir

@@ -11,7 +11,7 @@ include "Piko/Dialect/Piko/IR/PikoTypes.td"
 def Piko_CounterKind : I32EnumAttr<"CounterKind", "what a counter counts", [
   I32EnumAttrCase<"Calls", 0, "calls">,
   I32EnumAttrCase<"Iterations", 1, "iterations">,
-  I32EnumAttrCase<"Turns", 2, "turns">,
+  I32EnumAttrCase<"Trips", 2, "trips">,
   I32EnumAttrCase<"Emissions", 3, "emissions">,
   I32EnumAttrCase<"Reads", 4, "reads">,
   I32EnumAttrCase<"Stores", 5, "stores">,
@@ -39,7 +39,7 @@ def Piko_CounterOp : Piko_Op<"counter", [
 
     ```mlir
     piko.counter 0 calls of "shade"
-    piko.counter 1 turns of "shade" inside 0
+    piko.counter 1 trips of "shade" inside 0
     piko.counter 2 effects of "shade" inside 1
     piko.counter 3 emissions of "shade" port 0
     piko.counter 4 reads of "shade" to @lights

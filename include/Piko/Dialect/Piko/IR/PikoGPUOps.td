@@ -8,18 +8,13 @@
 
 include "Piko/Dialect/Piko/IR/PikoTypes.td"
 
-/// Says that an operation is a target's: no kernel of the machine level has it.
-def Piko_GPUOnly : NativeOpTrait<"CPUOnly"> {
-  let cppNamespace = "::piko";
-}
-
 class Piko_GPUOp<string mnemonic, list<Trait> traits = []>
-    : Piko_Op<"gpu." # mnemonic, !listconcat([Piko_GPUOnly], traits)>;
+    : Piko_Op<"gpu." # mnemonic, !listconcat([Piko_TargetLevel], traits)>;
 
 def Piko_OpenLogOp : Piko_GPUOp<"open_log"> {
   let summary = "what the blocks of a grid leave their emissions in";
   let description = [{
-    Takes the place of the writers of a CPU's units. In front of the launch.
+    Takes the place of the writers of a CPU's units. Before the launch.
 
     ```mlir
     %log = piko.gpu.open_log %bins : !piko.bins<@Fragment>
@@ -33,7 +28,7 @@ def Piko_OpenLogOp : Piko_GPUOp<"open_log"> {
 def Piko_BlockCountOp : Piko_GPUOp<"block_count"> {
   let summary = "how many blocks run the units of work";
   let description = [{
-    In front of the launch. None if there is nothing to do. Where the runtime does
+    Before the launch. None if there is nothing to do. Where the runtime does
     not know how many units there are, as many as fill the device: a block takes
     one unit after the other.
 
@@ -50,7 +45,7 @@ def Piko_BlockCountOp : Piko_GPUOp<"block_count"> {
 def Piko_CloseLogOp : Piko_GPUOp<"close_log"> {
   let summary = "gives what a grid has emitted to the runtime, unit by unit";
   let description = [{
-    Behind the launch.
+    After the launch.
 
     ```mlir
     piko.gpu.close_log %log
@@ -74,19 +69,19 @@ def Piko_LogOfOp : Piko_GPUOp<"log_of", [Pure]> {
   let assemblyFormat = "$log `of` $stage attr-dict";
 }
 
-def Piko_OutboxesOp : Piko_GPUOp<"outboxes"> {
+def Piko_AppendBuffersOp : Piko_GPUOp<"append_buffers"> {
   let summary = "where a thread keeps what it emits, until the block takes it";
   let description = [{
-    Says for the `gpu.launch` around where each thread has its outboxes: one for
-    the log and one for each port of a local edge, of six numbers each. What the
-    block has of a local edge is in its memory, four numbers each. `for errors`: that
-    of the log is in the log itself, from the first error on, and the first number is
-    its address; so a grid that emits nothing keeps one number.
+    Says for the `gpu.launch` around where each thread has its append buffers: one
+    for the log and one for each port of a local edge, of six numbers each. What the
+    block has of a local edge is in its memory, four numbers each. `for errors`:
+    that of the log is in the log itself, from the first error on, and the first
+    number is its address; so a grid that emits nothing keeps one number.
 
     ```mlir
-    piko.gpu.outboxes %log in %numbers : memref<6xi64>
-    piko.gpu.outboxes %log for errors in %numbers : memref<6xi64>
-    piko.gpu.outboxes %log in %more : memref<12xi64> local [@test] [0] in %kept
+    piko.gpu.append_buffers %log in %numbers : memref<6xi64>
+    piko.gpu.append_buffers %log for errors in %numbers : memref<6xi64>
+    piko.gpu.append_buffers %log in %more : memref<12xi64> local [@test] [0] in %kept
       : memref<4xi64, 3>
     ```
   }];
@@ -102,22 +97,22 @@ def Piko_OutboxesOp : Piko_GPUOp<"outboxes"> {
 }
 
 def Piko_FlushOp : Piko_GPUOp<"flush"> {
-  let summary = "puts what threads have emitted behind what the block has";
+  let summary = "puts what threads have emitted after what the block has";
   let description = [{
     All threads of the block come here; it is a barrier. By one reservation in the
-    log the block takes what is in the outboxes, in the order of threads: a thread's
-    place follows from votes in its warp and a sum over warps, whose numbers are in
-    memory of the block, one for each warp and one more. It belongs to a unit of
-    work, which all of them run.
+    log the block takes what is in the append buffers, in the order of threads: a
+    thread's place follows from votes in its warp and a sum over warps, whose
+    numbers are in memory of the block, one for each warp and one more. It belongs
+    to a unit of work, which all of them run.
 
     ```mlir
-    piko.gpu.flush %log[%unit] using %cells : memref<33xi64, 3>
+    piko.gpu.flush %log[%unit] using %words : memref<33xi64, 3>
     ```
   }];
   let arguments = (ins Piko_WriterType:$log, Index:$unit,
-      MemRefOf<[I64]>:$cells);
+      MemRefOf<[I64]>:$words);
   let assemblyFormat =
-      "$log `[` $unit `]` `using` $cells attr-dict `:` type($cells)";
+      "$log `[` $unit `]` `using` $words attr-dict `:` type($words)";
 }
 
 def Piko_AllocateOp : Piko_GPUOp<"allocate"> {
@@ -168,7 +163,7 @@ def Piko_TakeUnitsOp : Piko_GPUOp<"take_units"> {
   let summary = "takes the next units of work for a block";
   let description = [{
     So many, by one thread of a block: the number of the first one, which may be
-    behind the last unit. Each is given once to all blocks of a launch. `for rest`
+    after the last unit. Each is given once to all blocks of a launch. `for rest`
     counts those of the kernel's second launch.
 
     ```mlir

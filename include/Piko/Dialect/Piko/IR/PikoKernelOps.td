@@ -15,9 +15,9 @@ def Piko_KernelOp : Piko_Op<"kernel", [
   let description = [{
     When a kernel runs is said by the `piko.program`; where there is none yet,
     kernels stand in the order in which they run. At the
-    kernels level the body holds phases: the process phase of a stage and, behind
+    kernels level the body holds phases: the process phase of a stage and, after
     it, the assign phases of the stages that it feeds, or the assign phase of a
-    source. More process phases may follow, each behind a `piko.local_barrier`.
+    source. More process phases may follow, each after a `piko.local_barrier`.
     At the machine level it holds structured work instead: a `piko.bins`, or the
     `piko.items` of a source. Below, a target has made loops of that, and no phase
     or work is left. The kernel of a dynamic schedule is a loop over bins and runs
@@ -80,9 +80,9 @@ def Piko_LocalBarrierOp : Piko_Op<"local_barrier", [
     HasParent<"KernelOp">, DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
   let summary = "what a port emits stays in its bin, for the next phase";
   let description = [{
-    Stands in front of a process phase that runs in the kernel of the stage that
-    feeds it. For each bin, the phases in front of the barrier run for all that is
-    in the bin, then the phase behind it runs for what they have emitted to the
+    Stands before a process phase that runs in the kernel of the stage that
+    feeds it. For each bin, the phases before the barrier run for all that is
+    in the bin, then the phase after it runs for what they have emitted to the
     port. The consumer collects, has bins of the same size, and has this edge
     alone.
 

@@ -283,7 +283,7 @@ def Piko_LaneAppendOp : Piko_CPUOp<"append", [
     stage's, and into a tile of it where there are tiles. Positions are not
     counted: see `piko.cpu.is_counted`.
 
-    The lanes' records are transposed, and stored one behind the other.
+    The lanes' records are transposed, and stored one after the other.
 
     ```mlir
     piko.cpu.append %writer[0] (%values, %values : vector<16xf32>, vector<16xf32>)

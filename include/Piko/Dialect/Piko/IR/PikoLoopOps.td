@@ -174,11 +174,11 @@ def Piko_GroupedOp : Piko_BarrierOp<"grouped", [
     hold gets zeros for results.
 
     ```mlir
-    piko.grouped where %covered by %x, %y : i32, i32 with %alpha : f32 {
-    ^bb0(%u: i32, %v: i32, %a: f32):
-      piko.update @color[%u, %v : i32, i32] in %bin {
+    piko.grouped where %always by %x, %y : i32, i32 with %z : f32 {
+    ^bb0(%column: i32, %row: i32, %factor: f32):
+      piko.update @depth[%column, %row : i32, i32] in %bin {
       ^bb0(%old: f32):
-        %new = arith.mulf %old, %a : f32
+        %new = arith.mulf %old, %factor : f32
         piko.yield [%new : f32]
       }
       piko.yield

@@ -18,7 +18,7 @@ def Piko_BinsOp : Piko_Op<"bins", [
     that holds a primitive, or, where the schedule says `every_bin`, for each bin.
     Bins are concurrent; the schedule of the stage says where they run. The first
     `piko.items` or `piko.lists` of the body takes what is in the bin, all others
-    take what one in front of them has emitted there.
+    take what one before them has emitted there.
 
     ```mlir
     piko.record @F {"x" : i32 at 0} size 4 align 4
@@ -94,7 +94,7 @@ def Piko_ItemsOp : Piko_WorkOp<"items"> {
     parallel loops in the body, which all lanes share for one primitive after the
     other; `collapsed`, pairs of a primitive and an iteration; or `one` lane does
     everything. What lanes do at the same time is seen in order of lineage. It stands
-    behind what the work takes: `piko.items of @split lanes items`.
+    after what the work takes: `piko.items of @split lanes items`.
 
     See `piko.bins`.
   }];
@@ -175,7 +175,7 @@ def Piko_PlaceOp : Piko_Op<"place", [
   let summary = "puts a primitive into a bin of a stage";
   let description = [{
     The primitive is what a `piko.emit` has sent out of a port, or one of a
-    source. Where the stage's bins are divided into tiles, the tile stands behind
+    source. Where the stage's bins are divided into tiles, the tile stands after
     the bin. A bin outside the grid is an error when the pipeline runs; one that
     is named twice counts once. See `piko.bins`.
   }];
@@ -193,7 +193,7 @@ def Piko_TileOp : Piko_Op<"tile", [
   let summary = "the pixels of an image in a bin, for who runs the bin";
   let description = [{
     From here to `piko.write_tile`, the bin's pixels of the image are in the tile
-    and not in the image. Accesses name the tile, behind the image that it is of;
+    and not in the image. Accesses name the tile, after the image that it is of;
     their coordinates stay those of the image. A bin at the end of the domain
     may be smaller than its tile; what is outside is never read.
 

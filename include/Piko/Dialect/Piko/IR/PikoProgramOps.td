@@ -17,7 +17,7 @@ def Piko_ProgramOp : Piko_Op<"program", [
     type `!piko.edge` holds primitives in lineage order, and is used once: it is
     joined into the bins of a stage, whose kernel takes them.
 
-    `roots` are the stages that collect and emit: each begins a lineage, behind
+    `roots` are the stages that collect and emit: each begins a lineage, after
     those of the sources, and in this order. Stages of one `piko.rounds` share
     one.
 
@@ -293,7 +293,7 @@ def Piko_RoundsOp : Piko_ProgramRegion<"rounds"> {
   let description = [{
     The region runs again and again. Kernels without a `turn` run when something
     has come for them, so that all spreads until it has come to stages that
-    collect, or has left the cycle. Behind them, one kernel with a turn takes
+    collect, or has left the cycle. After them, one kernel with a turn takes
     all that has come for it: the next one for which there is something. When
     each has had its turn and something is left, another round begins. An edge
     holds what was emitted until it is taken.

@@ -184,15 +184,16 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     Where bins run (`load_balance`, `direct_map`, `serialize`, `all` with
     the `tile_split` size of the chunks that a bin is cut into), what they
     wait for (`end_stage`, `end_bin`, a `batch` of primitives), and whether
-    the stage gives up the order of its emissions (`unordered`). `behind` is set by
+    the stage gives up the order of its emissions (`unordered`). `after` is set by
     `piko-fuse-stages`: if `piko-fuse-kernels` makes one kernel of the stage and
     the one that feeds it, a list of the bin is between them. `lanes` says what
     lanes are given (see `piko.items`), in place of `piko-map-lanes`. What depends
     on the bin or on constants is said by a `dynamic` body, which runs for each
     bin before the pipeline does and overrides the directives.
 
-    Of a `resolved` schedule the compiler makes a loop of its own kind; any
-    other is left to the runtime's scheduler.
+    A `resolved` schedule says all that is known of its bins. If it is
+    `serialize`, the compiler makes a sequential loop; else the runtime hands
+    out units.
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
@@ -218,16 +219,16 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
   let arguments = (ins Piko_ScheduleKind:$kind,
     OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$tileSplit,
     OptionalAttr<TypedArrayAttrBase<FlatSymbolRefAttr, "stages to wait for">>:$endStage,
-    UnitAttr:$endBin, UnitAttr:$behind,
+    UnitAttr:$endBin, UnitAttr:$after,
     OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$batch,
     UnitAttr:$everyBin, UnitAttr:$unordered, UnitAttr:$resolved,
     OptionalAttr<Piko_LaneMappingAttr>:$lanes);
   let regions = (region MaxSizedRegion<1>:$body);
   let assemblyFormat = [{
     $kind (`tile_split` $tileSplit^)? (`end_stage` $endStage^)?
-    (`end_bin` $endBin^)? (`behind` $behind^)? (`batch` $batch^)? (`every_bin` $everyBin^)?
-    (`unordered` $unordered^)? (`resolved` $resolved^)? (`lanes` $lanes^)?
-    attr-dict-with-keyword (`dynamic` custom<IsolatedBody>($body)^)?
+    (`end_bin` $endBin^)? (`after` $after^)? (`batch` $batch^)? (`every_bin`
+    $everyBin^)? (`unordered` $unordered^)? (`resolved` $resolved^)? (`lanes`
+    $lanes^)? attr-dict-with-keyword (`dynamic` custom<IsolatedBody>($body)^)?
   }];
   let hasRegionVerifier = 1;
 }

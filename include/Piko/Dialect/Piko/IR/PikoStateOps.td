@@ -19,7 +19,7 @@ def Piko_LoadOp : Piko_StateAccessOp<"load", [MemoryEffects<[MemRead]>]> {
   let summary = "reads a field of a piece of state";
   let description = [{
     A constant takes no index, a buffer one, an image one for each dimension;
-    an element of an array field takes further ones behind the field's name.
+    an element of an array field takes further ones after the field's name.
     An index outside the buffer or image is an error when the pipeline runs;
     `checked` says that the test for it is already there. Where a phase has
     become a part of another stage's, `of` names its stage, for that error, and
