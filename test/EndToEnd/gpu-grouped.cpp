@@ -11,6 +11,7 @@
 // CASE: --pipe Rounds --count 700 --domain 40 30
 // CASE: --pipe Either --count 700 --domain 40 30
 // CASE: --pipe Twice --count 700 --domain 40 30
+// CASE: --pipe Cases --count 700 --domain 40 30
 // CASE: --pipe Strokes --count 700 --domain 40 30
 // CASE: --pipe Tables --count 700 --domain 40 30
 // CASE: --pipe Scattered --count 300 --domain 40 30
@@ -32,6 +33,11 @@
 // TWICE: remark: one thread does what iterations do that may update a pixel of another one: an iteration has two updates of one image; one update would be shared
 // RUN: pikoc %s --pipe Strokes --emit=gpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=STROKES
 // STROKES: remark: one thread does what iterations do that may update a pixel of another one: an iteration updates pixels in a loop of its own; a parallel loop over all of its pixels would be shared
+// RUN: pikoc %s --pipe Cases --emit=gpu --remarks -o /dev/null 2>&1 | FileCheck %s --check-prefix=CASES
+// CASES: remark: one thread does what iterations do that may update a pixel of another one: the update is in a switch; in branches of if it would be shared
+// A barrier that not all come to is named as the text has it, and no group runs after.
+// RUN: not piko-compare %s --pipe Parted --count 90 --domain 40 30 --runs 1 --threads 2 --target gpu-on-cpu --gpu-threads 16 | FileCheck %s --check-prefix=PARTED
+// PARTED: got: stage 'stage', bin 0: expected every iteration of parallelFor to call sync() as often as iteration 0, but iteration {{[0-9]+}} does not
 #include <piko.h>
 
 struct Point {
@@ -201,6 +207,42 @@ struct Stroke : Body {
   }
 };
 
+struct Case : Body {
+  void process(const piko::List<Point> &list) {
+    parallelFor(list.size(), [&](int i) {
+      const Point &p = list[i];
+      switch (p.tag % 5) {
+      case 1:
+        update(state().image, pixelOf(p, i),
+               [&](Cell &c) { mix(c, p.value, i); });
+        break;
+      case 2:
+        piko::atomicAdd(state().out[3], 1);
+        break;
+      case 3:
+        piko::atomicAdd(state().out[3], p.tag % 8);
+      }
+    });
+  }
+};
+
+// An update, and then a barrier that only some come to.
+struct Part : Body {
+  void process(const piko::List<Point> &list) {
+    int n = int(list.size());
+    parallelFor(n, [&](int i) {
+      if (i % 16 < 7) {
+        update(state().image, pixelOf(list[i], i),
+               [&](Cell &c) { mix(c, 1, i); });
+        if (n > 2)
+          sync();
+        update(state().other, pixelOf(list[i], 1),
+               [&](Cell &c) { mix(c, 2, i); });
+      }
+    });
+  }
+};
+
 // An array of the iteration, before and after.
 struct Table : Body {
   void process(const piko::List<Point> &list) {
@@ -266,6 +308,8 @@ struct Rounds : Alone<Round> {};
 struct Either : Alone<OneOrOther> {};
 struct Twice : Alone<TwoOfOne> {};
 struct Strokes : Alone<Stroke> {};
+struct Cases : Alone<Case> {};
+struct Parted : Alone<Part> {};
 struct Tables : Alone<Table> {};
 struct Scattered : Alone<Scatter> {};
 struct Looped : Alone<Loop> {};

@@ -40,6 +40,18 @@ private:
   scf::ForOp loop;
 };
 
+/// What a text calls the first barrier in an operation that it has itself.
+static StringRef getBarrierName(Operation *op) {
+  Operation *found = nullptr;
+  op->walk<WalkOrder::PreOrder>([&](BarrierOpInterface barrier) {
+    if (isa<GroupedOp>(*barrier))
+      return WalkResult::advance();
+    found = barrier;
+    return WalkResult::interrupt();
+  });
+  return getCppName(found ? found : findBarrier(op));
+}
+
 static Value findWriter(Operation *op) {
   if (auto local = op->getParentOfType<LocalBinOp>())
     return local.getWriter();
@@ -262,6 +274,7 @@ void LoopSplitter::splitGrouped(GroupedOp op, Piece &piece) {
   });
   loop->setAttr(marks::lanes, builder.getUnitAttr());
   loop->setAttr(marks::disjoint, builder.getUnitAttr());
+  loops.push_back(loop); // which does not run on what was never left
   readFrom(op.getResults(), results);
 }
 
@@ -307,7 +320,7 @@ void LoopSplitter::runGroup(GroupedOp op, Value first, Value groups,
 }
 
 void LoopSplitter::splitIf(scf::IfOp op, Piece &piece) {
-  compare(op.getCondition(), getCppName(findBarrier(op)));
+  compare(op.getCondition(), getBarrierName(op));
   SmallVector<Value> arrays = addSlots(op.getResultTypes());
   bool hasElse = !op.getElseRegion().empty();
   auto ifOp = scf::IfOp::create(builder, op.getLoc(), TypeRange(),
@@ -326,7 +339,7 @@ void LoopSplitter::splitIf(scf::IfOp op, Piece &piece) {
 }
 
 void LoopSplitter::splitSwitch(scf::IndexSwitchOp op, Piece &piece) {
-  compare(op.getArg(), getCppName(findBarrier(op)));
+  compare(op.getArg(), getBarrierName(op));
   SmallVector<Value> arrays = addSlots(op.getResultTypes());
   auto switchOp =
       scf::IndexSwitchOp::create(builder, op.getLoc(), TypeRange(), op.getArg(),
@@ -362,7 +375,7 @@ void LoopSplitter::splitFor(scf::ForOp op, Piece &piece) {
     OpBuilder inPiece = piece.atEnd();
     Value trips = createTripCount(inPiece, op);
     uniformity.replace(parallel.getIteration(), trips);
-    compare(trips, getCppName(findBarrier(op)));
+    compare(trips, getBarrierName(op));
     loop = scf::ForOp::create(builder, op.getLoc(), zero, trips, one);
   }
   loops.push_back(loop);
@@ -395,7 +408,7 @@ void LoopSplitter::splitForBody(scf::ForOp op, scf::ForOp loop,
 
 void LoopSplitter::splitWhile(scf::WhileOp op, Piece &piece) {
   Location loc = op.getLoc();
-  StringRef barrier = getCppName(findBarrier(op));
+  StringRef barrier = getBarrierName(op);
   SmallVector<Value> before =
       addSlots(ValueRange(op.getBeforeArguments()).getTypes());
   SmallVector<Value> after = addSlots(op.getResultTypes());

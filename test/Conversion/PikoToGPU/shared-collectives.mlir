@@ -135,3 +135,48 @@ piko.pipeline @Grouped rank 1 {
     }
   }
 }
+
+// -----
+
+piko.record @F {"x" : i32 at 0, "y" : i32 at 4} size 8 align 4
+piko.record @Pixel {"n" : i32 at 0} size 4 align 4
+// No group runs once iterations have not agreed on the way to the barrier: what it
+// would take was never left.
+// CHECK-LABEL: piko.pipeline @Parted
+// CHECK:         piko.fail_barrier
+// CHECK:         %[[RUNS:.*]] = arith.cmpi ne, %{{.*}}, %c0
+// CHECK:         %[[COUNT:.*]] = arith.select %[[RUNS]], %{{.*}}, %c0
+// CHECK:         scf.for %{{.*}} to %[[COUNT]] step %c16 {
+// CHECK:           piko.store %{{.*}}, checked @image
+piko.pipeline @Parted rank 1 {
+  piko.image @image : @Pixel rank 1
+  piko.source @a
+  piko.stage @a bins [0] threads 64 : @F -> [] {}
+  piko.kernel @kernel_a {
+    piko.bins of @a {
+    ^bb0(%bin: index):
+      piko.items of @a lanes iterations {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %n = arith.index_cast %x : i32 to index
+        piko.parallel_for %n {
+        ^bb0(%i: index):
+          %c = arith.constant 16 : index
+          %lt = arith.cmpi slt, %i, %c : index
+          scf.if %lt {
+            piko.sync
+            %y = piko.get %f "y" : !piko.prim<@F> -> i32
+            %ii = arith.index_cast %i : index to i32
+            %q = arith.muli %ii, %y : i32
+            piko.update @image[%q : i32] in %bin {
+            ^bb0(%old: i32):
+              %s = arith.addi %old, %q : i32
+              piko.yield [%s : i32]
+            }
+          }
+          piko.yield
+        }
+      }
+    }
+  }
+}

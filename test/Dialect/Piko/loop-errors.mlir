@@ -354,3 +354,41 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    %table = memref.alloca() : memref<4xi32>
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      // expected-error@+1 {{expected numbers and primitives for values, but got 'memref<4xi32>'}}
+      piko.grouped where %yes by %i : index with %table : memref<4xi32> {
+      ^bb0(%key: index, %t: memref<4xi32>):
+        piko.yield
+      }
+      piko.yield
+    }
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %n = arith.constant 8 : index
+    %yes = arith.constant true
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      piko.grouped where %yes by %i : index {
+      ^bb0(%key: index):
+        // expected-error@+1 {{expected to be outside the body of a grouped}}
+        piko.sync
+        piko.yield
+      }
+      piko.yield
+    }
+  }
+}

@@ -76,8 +76,12 @@ static std::optional<Obstacle> findObstacle(UpdateOp update, Operation *loop) {
   Operation *middle = update;
   for (scf::IfOp branch : findBranches(update, loop)) {
     if (!branch)
-      return cannot("an iteration updates pixels in a loop of its own; a "
-                    "parallel loop over all of its pixels would be shared");
+      return cannot(middle->getParentOfType<scf::IndexSwitchOp>()
+                        ? "the update is in a switch; in branches of if it "
+                          "would be shared"
+                        : "an iteration updates pixels in a loop of its own; a "
+                          "parallel loop over all of its pixels would be "
+                          "shared");
     if (!llvm::all_of(findCrossing(middle), canLeave))
       return cannot("what an iteration has before the update and uses after it "
                     "is not numbers or primitives");
@@ -97,6 +101,8 @@ piko::findObstacleToGrouping(ParallelLoopOpInterface loop) {
   llvm::MapVector<Attribute, UpdateOp> updates;
   std::optional<Obstacle> found;
   loop->walk([&](UpdateOp update) {
+    if (isa<GroupedOp>(update->getParentOp()))
+      return;
     auto [at, isFirst] = updates.insert({update.getImageAttr(), update});
     if (!isFirst)
       found = Obstacle{update.getLoc(),
@@ -210,7 +216,10 @@ static bool isEmpty(scf::IfOp branch) {
 
 void piko::groupUpdates(ParallelLoopOpInterface loop) {
   SmallVector<UpdateOp> updates;
-  loop->walk([&](UpdateOp update) { updates.push_back(update); });
+  loop->walk([&](UpdateOp update) {
+    if (!isa<GroupedOp>(update->getParentOp()))
+      updates.push_back(update);
+  });
   for (UpdateOp update : updates) {
     SmallVector<scf::IfOp> branches = findBranches(update, loop);
     GroupedOp grouped = wrap(update, loop);

@@ -114,6 +114,8 @@ static LogicalResult verifyBarrier(Operation *op) {
   if (Operation *combine = op->getParentOfType<ScanOp>();
       combine && combine != op)
     return op->emitOpError("expected to be outside the body of a scan");
+  if (Operation *group = op->getParentOfType<GroupedOp>(); group && group != op)
+    return op->emitOpError("expected to be outside the body of a grouped");
   return success();
 }
 
@@ -121,7 +123,13 @@ LogicalResult SyncOp::verify() { return verifyBarrier(*this); }
 LogicalResult ReduceOp::verify() { return verifyBarrier(*this); }
 LogicalResult ScanOp::verify() { return verifyBarrier(*this); }
 LogicalResult SortOp::verify() { return verifyBarrier(*this); }
-LogicalResult GroupedOp::verify() { return verifyBarrier(*this); }
+LogicalResult GroupedOp::verify() {
+  for (Type type : getValues().getTypes())
+    if (!isa<PrimType>(type) && !type.isIntOrIndexOrFloat())
+      return emitOpError("expected numbers and primitives for values, but got ")
+             << type;
+  return verifyBarrier(*this);
+}
 
 /// The body of a reduction or a scan takes two values and yields one.
 static LogicalResult verifyCombine(Operation *op, TypeRange types) {
