@@ -5,6 +5,8 @@
 
 #include "Piko/Analysis/Uniformity.h"
 
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
+
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
@@ -25,6 +27,17 @@ Operation *piko::findBarrier(Operation *op) {
     return WalkResult::interrupt();
   });
   return found;
+}
+
+StringRef piko::getBarrierName(Operation *op) {
+  Operation *found = nullptr;
+  op->walk<WalkOrder::PreOrder>([&](BarrierOpInterface barrier) {
+    if (isa<GroupedOp>(*barrier))
+      return WalkResult::advance();
+    found = barrier;
+    return WalkResult::interrupt();
+  });
+  return getCppName(found ? found : findBarrier(op));
 }
 
 Value piko::findOnlyValue(Value yes, Value no) {

@@ -41,7 +41,7 @@ struct Spread : piko::Stage<8, 8, 64, Point, Point, Point> {
 // Those with an odd tag first.
 struct Sort : piko::Stage<8, 8, 64, Point, Point, Point> {
   void assignBin(const Point &p) {
-    if (p.tag % 7 != 3) // may stay after
+    if (p.tag % 7 != 3) // may stay behind
       assignToPreviousBins(p);
   }
   void schedule(piko::BinId) {

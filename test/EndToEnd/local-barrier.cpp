@@ -77,7 +77,7 @@ struct Spread : piko::Stage<size, size, 64, Point, Point, Point>,
 struct Sort : piko::Stage<size, size, 64, Point, Point, Point>,
               piko::Uses<State> {
   void assignBin(const Point &p) {
-    if (p.tag % 7 != 3) // may stay after
+    if (p.tag % 7 != 3) // may stay behind
       assignToPreviousBins(p);
   }
   void schedule(piko::BinId) { endBin(); }

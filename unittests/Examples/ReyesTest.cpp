@@ -374,7 +374,8 @@ Patch makeGround(float reach) {
   });
 }
 
-// From before the eye to far after it; the lower half of the picture is full.
+// From in front of the eye to far behind it; the lower half of the picture is
+// full.
 TEST_F(ReyesTest, PatchesThroughTheEyePlane) {
   for (float reach : {3.0f, 100.0f, 1e4f}) {
     patches = {makeGround(reach)};

@@ -25,6 +25,9 @@ mlir::Value findOnlyValue(mlir::Value yes, mlir::Value no);
 /// loop meet; null if they do not.
 mlir::Operation *findBarrier(mlir::Operation *op);
 
+/// What a text calls the first of those that it has itself.
+llvm::StringRef getBarrierName(mlir::Operation *op);
+
 /// How far the values inside an operation are the same. What the analysis does
 /// not know is `Uniform::Iteration`, which promises nothing. All iterations are
 /// taken to agree on the control flow around barriers: where they may not, the

@@ -190,7 +190,7 @@ LogicalResult IterationMapper::mapBarrier(Operation *op) {
     op->erase();
     return success();
   }
-  StringRef name = getCppName(findBarrier(op));
+  StringRef name = getBarrierName(op);
   if (auto choice = dyn_cast<scf::IfOp>(op)) {
     choice.getConditionMutable().assign(agree(choice.getCondition(), name));
   } else if (auto choice = dyn_cast<scf::IndexSwitchOp>(op)) {
@@ -267,7 +267,7 @@ LogicalResult IterationMapper::mapFor(scf::ForOp op) {
   if (failed(guard(counting)))
     return failure();
   builder.setInsertionPoint(op);
-  Value agreed = agree(none.getOperand(0), getCppName(findBarrier(op)));
+  Value agreed = agree(none.getOperand(0), getBarrierName(op));
   none.erase();
   op.setLowerBound(index(0));
   op.setUpperBound(agreed);

@@ -3,11 +3,10 @@
 #include "Piko/Transforms/Storage/LoopSplitter.h"
 
 #include "Piko/Transforms/Storage/Collectives.h"
+#include "Piko/Transforms/Storage/Groups.h"
 #include "Piko/Transforms/Storage/ParallelLoops.h"
-#include "Piko/Transforms/Storage/PixelAccess.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
-#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -39,18 +38,6 @@ private:
   LoopSplitter &splitter;
   scf::ForOp loop;
 };
-
-/// What a text calls the first barrier in an operation that it has itself.
-static StringRef getBarrierName(Operation *op) {
-  Operation *found = nullptr;
-  op->walk<WalkOrder::PreOrder>([&](BarrierOpInterface barrier) {
-    if (isa<GroupedOp>(*barrier))
-      return WalkResult::advance();
-    found = barrier;
-    return WalkResult::interrupt();
-  });
-  return getCppName(found ? found : findBarrier(op));
-}
 
 static Value findWriter(Operation *op) {
   if (auto local = op->getParentOfType<LocalBinOp>())
@@ -199,51 +186,6 @@ void LoopSplitter::splitSort(SortOp op, Piece &piece) {
   readFrom(op.getIndex(), ranks);
 }
 
-/// A number for the key of a cell: cells with the same one are one group.
-static Value createGroupNumber(OpBuilder &builder, Location loc,
-                               ValueRange key) {
-  Type i64 = builder.getI64Type();
-  int64_t bits = 64 / std::max<size_t>(2, key.size());
-  Value number;
-  for (auto [dim, coordinate] : llvm::enumerate(key)) {
-    Value part = arith::IndexCastOp::create(builder, loc, i64, coordinate);
-    if (dim > 0)
-      part = arith::ShLIOp::create(
-          builder, loc, part,
-          arith::ConstantIntOp::create(builder, loc, dim * bits, 64));
-    number =
-        number ? arith::OrIOp::create(builder, loc, number, part) : Value(part);
-  }
-  return number;
-}
-
-/// The number of an iteration's group, -1 where it is in none. That updates are
-/// in their bin is tested here, so that what is outside is reported in the
-/// order of iterations.
-static Value createGroup(OpBuilder &builder, GroupedOp op, ValueRange key) {
-  Location loc = op.getLoc();
-  auto choice =
-      scf::IfOp::create(builder, loc, builder.getI1Type(), op.getCondition(),
-                        /*withElseRegion=*/true);
-  OpBuilder then = choice.getThenBodyBuilder();
-  CodeBuilder code(then, loc);
-  Value isInside = code.boolean(true);
-  op.walk([&](UpdateOp update) {
-    auto test = createInsideTest(then, update, key, then.getI1Type());
-    scf::YieldOp::create(then, loc, code.boolean(true));
-    then.setInsertionPointAfter(test);
-    isInside = code.both(isInside, test.getResult(0));
-    update->setAttr(marks::inside, builder.getUnitAttr());
-  });
-  scf::YieldOp::create(then, loc, isInside);
-  OpBuilder otherwise = choice.getElseBodyBuilder();
-  scf::YieldOp::create(otherwise, loc,
-                       CodeBuilder(otherwise, loc).boolean(false));
-  Value none = arith::ConstantIntOp::create(builder, loc, -1, 64);
-  return arith::SelectOp::create(builder, loc, choice.getResult(0),
-                                 createGroupNumber(builder, loc, key), none);
-}
-
 /// Sorts iterations by group, and runs each group where its first one stands.
 void LoopSplitter::splitGrouped(GroupedOp op, Piece &piece) {
   Location loc = op.getLoc();
@@ -268,55 +210,10 @@ void LoopSplitter::splitGrouped(GroupedOp op, Piece &piece) {
   Value room = slots->add(index, /*elements=*/2), ranks = slots->add(index);
   auto create = isShared ? createSharedSort : createSort;
   create(builder, loc, count, groups.front(), /*isUnsigned=*/true, room, ranks);
-  CodeBuilder code(builder, loc);
-  scf::ForOp loop = code.forEach(zero, count, one, [&](Value rank) {
-    runGroup(op, rank, groups.front(), ranks, values, results);
-  });
-  loop->setAttr(marks::lanes, builder.getUnitAttr());
-  loop->setAttr(marks::disjoint, builder.getUnitAttr());
-  loops.push_back(loop); // which does not run on what was never left
+  // It does not run on what was never left.
+  loops.push_back(createGroupLoop(builder, op, count, groups.front(), ranks,
+                                  values, results));
   readFrom(op.getResults(), results);
-}
-
-void LoopSplitter::runGroup(GroupedOp op, Value first, Value groups,
-                            Value ranks, ValueRange values,
-                            ValueRange results) {
-  CodeBuilder b(builder, op.getLoc());
-  using P = CodeBuilder::P;
-  auto groupAt = [&](Value rank) {
-    return b.load(groups, b.load(ranks, rank));
-  };
-  Value group = groupAt(first), isFirst = b.compare(P::eq, first, zero);
-  Value before = b.select(isFirst, zero, b.sub(first, one));
-  Value begins = b.either(isFirst, b.compare(P::ne, groupAt(before), group));
-  Value none = arith::ConstantIntOp::create(builder, b.loc, -1, 64);
-  b.when(b.both(begins, b.compare(P::ne, group, none)), [&] {
-    scf::WhileOp::create(
-        builder, b.loc, TypeRange{first.getType()}, first,
-        [&](OpBuilder &, Location, ValueRange now) {
-          Value iteration = b.load(ranks, now[0]);
-          IRMapping mapping;
-          for (auto [argument, array] :
-               llvm::zip(op.getBody().getArguments(), values))
-            mapping.map(argument,
-                        Slots::load(builder, b.loc, argument.getType(), array,
-                                    iteration));
-          Block &body = op.getBody().front();
-          for (Operation &inner : body.without_terminator())
-            builder.clone(inner, mapping);
-          for (auto [result, array] : llvm::zip(
-                   cast<YieldOp>(body.getTerminator()).getResults(), results))
-            Slots::store(builder, b.loc, mapping.lookupOrDefault(result), array,
-                         iteration);
-          Value next = b.add(now[0], one), last = b.sub(count, one);
-          Value isSame = b.compare(P::eq, groupAt(b.min(next, last)), group);
-          Value goesOn = b.both(b.compare(P::sle, next, last), isSame);
-          scf::ConditionOp::create(builder, b.loc, goesOn, next);
-        },
-        [&](OpBuilder &, Location, ValueRange now) {
-          scf::YieldOp::create(builder, b.loc, now);
-        });
-  });
 }
 
 void LoopSplitter::splitIf(scf::IfOp op, Piece &piece) {

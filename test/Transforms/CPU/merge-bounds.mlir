@@ -4,7 +4,7 @@ piko.record @V {"x" : f32 at 0, "y" : f32 at 4, "z" : f32[3 : 4] at 8} size 20 a
 piko.record @Wide {"x" : f32 at 0, "y" : f32 at 64} size 68 align 4
 
 // Four reads of an element under one test, with the error of the first; what
-// stands between stays after, and one that a condition guards is read along. A
+// stands between stays behind, and one that a condition guards is read along. A
 // read of another element, one of what the kernel changes, and one in a condition
 // of a record that is larger than a line of the cache keep their tests.
 // CHECK-LABEL: piko.kernel @k

@@ -45,11 +45,6 @@ private:
   void splitScan(ScanOp op, Piece &piece);
   void splitSort(SortOp op, Piece &piece);
   void splitGrouped(GroupedOp op, Piece &piece);
-  /// The iterations of a group, one after the other; the first is that of rank
-  /// `first`.
-  void runGroup(GroupedOp op, mlir::Value first, mlir::Value groups,
-                mlir::Value ranks, mlir::ValueRange values,
-                mlir::ValueRange results);
   void splitIf(mlir::scf::IfOp op, Piece &piece);
   void splitSwitch(mlir::scf::IndexSwitchOp op, Piece &piece);
   void splitFor(mlir::scf::ForOp op, Piece &piece);

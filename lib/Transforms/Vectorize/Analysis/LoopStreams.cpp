@@ -16,43 +16,46 @@ using namespace piko;
 namespace {
 
 /// How a value grows from one iteration to the next.
-enum class Growth { None, One, Other };
+enum class StreamGrowth { None, One, Other };
 
 } // namespace
 
 /// From what is not too far away.
-static Growth getGrowth(Value value, scf::ForOp loop, unsigned depth = 8) {
+static StreamGrowth getGrowth(Value value, scf::ForOp loop,
+                              unsigned depth = 8) {
   if (loop.isDefinedOutsideOfLoop(value))
-    return Growth::None;
+    return StreamGrowth::None;
   if (auto argument = dyn_cast<BlockArgument>(value)) {
     if (argument.getOwner() != loop.getBody())
-      return Growth::Other;
+      return StreamGrowth::Other;
     if (argument == loop.getInductionVar())
-      return matchPattern(loop.getStep(), m_One()) ? Growth::One
-                                                   : Growth::Other;
+      return matchPattern(loop.getStep(), m_One()) ? StreamGrowth::One
+                                                   : StreamGrowth::Other;
     auto next = loop.getTiedLoopYieldedValue(argument)
                     ->get()
                     .getDefiningOp<arith::AddIOp>();
     bool isCount = next && next.getLhs() == argument &&
                    matchPattern(next.getRhs(), m_One());
-    return isCount ? Growth::One : Growth::Other;
+    return isCount ? StreamGrowth::One : StreamGrowth::Other;
   }
   Operation *op = value.getDefiningOp();
   if (depth == 0)
-    return Growth::Other;
+    return StreamGrowth::Other;
   if (isa<arith::IndexCastOp, arith::IndexCastUIOp, arith::ExtSIOp,
           arith::ExtUIOp, arith::TruncIOp>(op))
     return getGrowth(op->getOperand(0), loop, depth - 1);
-  SmallVector<Growth> growths;
+  SmallVector<StreamGrowth> growths;
   for (Value operand : op->getOperands())
     growths.push_back(getGrowth(operand, loop, depth - 1));
-  if (llvm::all_of(growths, [](Growth g) { return g == Growth::None; }))
-    return isMemoryEffectFree(op) ? Growth::None : Growth::Other;
-  bool isSum =
-      (isa<arith::AddIOp>(op) && llvm::is_contained(growths, Growth::None)) ||
-      (isa<arith::SubIOp>(op) && growths[1] == Growth::None);
-  return isSum && llvm::is_contained(growths, Growth::One) ? Growth::One
-                                                           : Growth::Other;
+  if (llvm::all_of(growths,
+                   [](StreamGrowth g) { return g == StreamGrowth::None; }))
+    return isMemoryEffectFree(op) ? StreamGrowth::None : StreamGrowth::Other;
+  bool isSum = (isa<arith::AddIOp>(op) &&
+                llvm::is_contained(growths, StreamGrowth::None)) ||
+               (isa<arith::SubIOp>(op) && growths[1] == StreamGrowth::None);
+  return isSum && llvm::is_contained(growths, StreamGrowth::One)
+             ? StreamGrowth::One
+             : StreamGrowth::Other;
 }
 
 namespace {
@@ -100,20 +103,22 @@ static std::optional<StreamPlace> getPlace(Operation *op) {
 
 /// How the place of an access grows: by one element, if that is as small as a
 /// number or four.
-static Growth getGrowth(const StreamPlace &place, scf::ForOp loop) {
+static StreamGrowth getGrowth(const StreamPlace &place, scf::ForOp loop) {
   constexpr int64_t largest = 16;
   if (place.indices.empty())
-    return Growth::None;
+    return StreamGrowth::None;
   for (Value index : ArrayRef(place.indices).drop_back())
-    if (getGrowth(index, loop) != Growth::None)
-      return Growth::Other;
-  Growth growth = getGrowth(place.indices.back(), loop);
-  return growth == Growth::One && place.size > largest ? Growth::Other : growth;
+    if (getGrowth(index, loop) != StreamGrowth::None)
+      return StreamGrowth::Other;
+  StreamGrowth growth = getGrowth(place.indices.back(), loop);
+  return growth == StreamGrowth::One && place.size > largest
+             ? StreamGrowth::Other
+             : growth;
 }
 
 bool piko::isStream(Operation *access, scf::ForOp loop) {
   std::optional<StreamPlace> place = getPlace(access);
-  return place && getGrowth(*place, loop) == Growth::One;
+  return place && getGrowth(*place, loop) == StreamGrowth::One;
 }
 
 /// Whether a value is the same in each iteration of `loop`, or runs through the
@@ -153,7 +158,7 @@ static bool isShort(scf::ForOp loop) {
 
 static bool isReordered(scf::ForOp loop, unsigned i) {
   Value carried = loop.getRegionIterArg(i), next = loop.getYieldedValues()[i];
-  if (getGrowth(carried, loop) == Growth::One)
+  if (getGrowth(carried, loop) == StreamGrowth::One)
     return true;
   Operation *op = next.getDefiningOp();
   return carried.getType().isIntOrIndex() && op &&
@@ -172,9 +177,10 @@ static bool isStraight(Block &body, scf::ForOp loop) {
     if (op.getNumRegions() != 0)
       return false;
     if (std::optional<StreamPlace> place = getPlace(&op)) {
-      Growth growth = getGrowth(*place, loop);
+      StreamGrowth growth = getGrowth(*place, loop);
       bool isWrite = isa<StoreOp, memref::StoreOp>(op);
-      return growth == Growth::One || (growth == Growth::None && !isWrite);
+      return growth == StreamGrowth::One ||
+             (growth == StreamGrowth::None && !isWrite);
     }
     return isMemoryEffectFree(&op) || isa<GetOp>(op);
   });

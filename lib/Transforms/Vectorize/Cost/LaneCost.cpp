@@ -3,16 +3,14 @@
 // What iterations of a loop cost as lanes, and one after the other: operations,
 // times how often they run, and for how many lanes.
 //
-// Loops on one side of a condition, in place of nothing, may be a slow path, as
-// clipping is, where code goes on after it. How often it runs is not known:
-// estimates are geometric means of those with it and without it. Of more than
-// two guards in a row, each in the other, none after the second is taken to let
-// fewer through. One iteration alone waits for each load whose place a load of
-// the iteration before says (LoadChains).
+// How often conditions let code run, BranchFrequency.h says. One iteration
+// alone waits for each load whose place a load of the iteration before says
+// (LoadChains).
 
 #include "Vectorize/Analysis/IterationLanes.h"
 #include "Vectorize/Analysis/LoadChains.h"
 #include "Vectorize/Analysis/LoopStreams.h"
+#include "Vectorize/Cost/BranchFrequency.h"
 #include "Vectorize/Cost/LaneCycles.h"
 
 #include "Piko/Analysis/BranchProbability.h"
@@ -35,115 +33,6 @@ static constexpr double loopIterations = 8, iterationsThatDiffer = 4;
 
 /// How many lanes are at work in a loop that each goes through by itself.
 static constexpr double fullness = 0.85;
-
-namespace {
-
-/// How often code runs, for each time that the loop's lanes do.
-struct Frequency {
-  double serial = 1, vectors = 1;
-
-  Frequency scaled(double bySerial, double byVectors) const {
-    return {serial * bySerial, vectors * byVectors};
-  }
-};
-
-} // namespace
-
-static int64_t countOperations(Region &region) {
-  int64_t count = 0;
-  region.walk([&](Operation *) { ++count; });
-  return count;
-}
-
-/// Whether a program that is right does not come here.
-static bool fails(Region &region) {
-  return !region.empty() && llvm::any_of(region.front(), [](Operation &op) {
-    return op.hasTrait<Failure>();
-  });
-}
-
-static bool mayFail(Region &region) {
-  return region
-      .walk([](Operation *op) {
-        return op->hasTrait<Failure>() ? WalkResult::interrupt()
-                                       : WalkResult::advance();
-      })
-      .wasInterrupted();
-}
-
-static bool hasLoop(Region &region) {
-  return region
-      .walk([](LoopLikeOpInterface) { return WalkResult::interrupt(); })
-      .wasInterrupted();
-}
-
-static bool isFallbackOf(Region &side, Region &other) {
-  return !other.empty() && hasLoop(side) && hasLoop(other) && mayFail(side) &&
-         !mayFail(other);
-}
-
-static Region &getOtherSide(scf::IfOp choice, Region &side) {
-  return &side == &choice.getThenRegion() ? choice.getElseRegion()
-                                          : choice.getThenRegion();
-}
-
-bool piko::isFallback(Region &region) {
-  auto choice = dyn_cast<scf::IfOp>(region.getParentOp());
-  return choice && isFallbackOf(region, getOtherSide(choice, region));
-}
-
-/// Operations of a side that does next to nothing.
-static constexpr int64_t trivial = 16;
-
-/// How often a side of a condition runs, where lanes differ: mostly, if it
-/// stands alone; hardly ever, if it does much more than the other, which does
-/// something, too.
-static Frequency getFrequency(Region &side, Region &other, int64_t laneCount) {
-  constexpr double rare = 0.001;
-  if (isFallbackOf(side, other))
-    return {rare, rare * double(laneCount)};
-  if (!other.empty() && isFallbackOf(other, side))
-    return {1, 1};
-  constexpr int64_t ratio = 2;
-  int64_t count = countOperations(side),
-          countOther = other.empty() ? 0 : countOperations(other);
-  if (countOther > trivial && count > ratio * countOther)
-    return {rare, rare * double(laneCount)};
-  if (countOther <= trivial || countOther > ratio * count)
-    return {0.8, 1};
-  return {0.5, 1};
-}
-
-/// Whether a condition is one more of those that all have to hold: it is all
-/// that one around it does, in place of next to nothing.
-static bool isNextGuard(scf::IfOp choice) {
-  auto outer = dyn_cast<scf::IfOp>(choice->getParentOp());
-  if (!outer || choice->getNextNode() != choice->getBlock()->getTerminator())
-    return false;
-  Region &other = getOtherSide(outer, *choice->getParentRegion());
-  return other.empty() || countOperations(other) <= trivial;
-}
-
-/// Whether code of a loop goes on after an operation.
-static bool goesOnAfter(Operation *op, Operation *loop) {
-  for (; op != loop; op = op->getParentOp()) {
-    int64_t after = 0;
-    for (Operation *at = op->getNextNode(); at; at = at->getNextNode())
-      at->walk([&](Operation *) { ++after; });
-    if (after > trivial)
-      return true;
-  }
-  return false;
-}
-
-/// Whether a side may be a slow path, as clipping is: it has loops, in place of
-/// next to nothing, and what follows is for both. Nothing says how often it
-/// runs.
-static bool mayBeSlowPath(scf::IfOp choice, Region &side, Operation *loop) {
-  Region &other = getOtherSide(choice, side);
-  return hasLoop(side) && !other.empty() && countOperations(other) <= trivial &&
-         goesOnAfter(choice, loop);
-}
 
 namespace {
 
@@ -312,7 +201,7 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
       // Many guards, each of which mostly lets through, mostly do together.
       if (!isState && !known && isNextGuard(choice) &&
           isNextGuard(cast<scf::IfOp>(choice->getParentOp())) &&
-          (other.empty() || countOperations(other) <= trivial))
+          doesNextToNothing(other))
         share.serial = share.vectors;
       if (!lanes.isVarying(choice.getCondition()))
         share.vectors = share.serial;
