@@ -27,7 +27,7 @@ KERNEL_OPS = re.compile(
 ASSIGN_OPS = re.compile(r"piko\.(assign_\w+|owner)\b")
 DIRECTIVES = re.compile(r"piko\.set_\w+")
 # A statement alone, or a region of it, is no program: its values come from
-# others. test/Dialect/Piko/program.mlir has them whole. Nor is there a grid.
+# others. test/Dialect/Piko/Program/program.mlir has them whole. Nor is there a grid.
 PROGRAM_OPS = re.compile(
     r"piko\.(clear|feed|join|launch|leave|wait|schedule_bins|strips|waves|rounds"
     r"|gpu\.\w+)\b"

@@ -4,7 +4,7 @@
 
 #include "Piko/Driver/Compiler.h"
 
-#include "AuthoredCache.h"
+#include "Cache/AuthoredCache.h"
 #include "Piko/Conversion/KernelImage.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Sequences.h"

@@ -24,7 +24,7 @@ static constexpr size_t largestStack = size_t(1) << 30;
 static constexpr size_t smallestStack = size_t(16) << 20;
 
 static void *callOnThread(void *function) {
-  detail::ArithmeticScope arithmetic;
+  piko::detail::ArithmeticScope arithmetic;
   (*static_cast<llvm::function_ref<void()> *>(function))();
   return nullptr;
 }
@@ -72,7 +72,7 @@ void piko::runOnDeepStack(llvm::function_ref<void()> function) {
 }
 
 static void endOutOfMemory(void *, const char *, bool) {
-  support::endOutOfMemory();
+  piko::support::endOutOfMemory();
 }
 
 int piko::runMainOnDeepStack(llvm::function_ref<int()> main) {

@@ -4,16 +4,17 @@
 
 #include "Piko/Driver/ObjectCompiler.h"
 
-#include "HeaderWriter.h"
-#include "KnownFiles.h"
+#include "Cache/KnownFiles.h"
+#include "Cache/OpenFiles.h"
+#include "Cache/SourceCache.h"
+#include "Header/HeaderWriter.h"
 #include "ObjectRequest.h"
-#include "OpenFiles.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Versions.h"
+#include "ProgramSymbol.h"
 #include "ReferenceObject.h"
-#include "SourceCache.h"
 
 #include "llvm/Support/Path.h"
 #include "llvm/TargetParser/Host.h"

@@ -4,9 +4,9 @@
 
 #include "ObjectRequest.h"
 
+#include "Cache/SourceCache.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Target/Assembler.h"
-#include "SourceCache.h"
 
 using namespace piko;
 

@@ -5,7 +5,7 @@
 #ifndef PIKO_LIB_DRIVER_OBJECTREQUEST_H
 #define PIKO_LIB_DRIVER_OBJECTREQUEST_H
 
-#include "CompilerIdentity.h"
+#include "Cache/CompilerIdentity.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Target/Processor.h"
 

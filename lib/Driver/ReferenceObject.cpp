@@ -4,13 +4,13 @@
 
 #include "ReferenceObject.h"
 
-#include "HeaderCache.h"
-#include "OpenFiles.h"
+#include "Cache/HeaderCache.h"
+#include "Cache/OpenFiles.h"
+#include "Cache/SourceCache.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/Diagnostics.h"
 #include "Piko/Frontend/HostCompiler.h"
 #include "Piko/Target/Object.h"
-#include "SourceCache.h"
 
 #include "llvm/Support/Path.h"
 #include "llvm/Transforms/IPO/Internalize.h"

@@ -10,10 +10,10 @@
 #ifndef PIKO_LIB_DRIVER_REFERENCEOBJECT_H
 #define PIKO_LIB_DRIVER_REFERENCEOBJECT_H
 
+#include "Cache/SourceRecorder.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Frontend/PipelineDescription.h"
 #include "Piko/Target/Processor.h"
-#include "SourceRecorder.h"
 
 #include <functional>
 

@@ -7,7 +7,6 @@
 #include "Import/Conflicts.h"
 #include "Import/ModuleBuilder.h"
 #include "Import/Wiring.h"
-#include "Parse/ClangInvocation.h"
 #include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
@@ -22,6 +21,7 @@
 #include "mlir/IR/Verifier.h"
 #include "mlir/Transforms/CSE.h"
 #include "mlir/Transforms/GreedyPatternRewriteDriver.h"
+#include "Clang/ClangInvocation.h"
 #include "llvm/ADT/StringExtras.h"
 
 #include <cmath>

@@ -4,10 +4,10 @@
 
 #include "Piko/Frontend/HostCompiler.h"
 
-#include "Parse/ClangDiagnostics.h"
-#include "Parse/ClangInvocation.h"
-#include "Parse/PrecompiledHeader.h"
 #include "Support/Shifts.h"
+#include "Clang/ClangDiagnostics.h"
+#include "Clang/ClangInvocation.h"
+#include "Clang/PrecompiledHeader.h"
 #include "clang/CodeGen/CodeGenAction.h"
 #include "clang/Frontend/CompilerInstance.h"
 #include "clang/Lex/PreprocessorOptions.h"

@@ -2,10 +2,10 @@
 //===- CPUExecutor.cpp - Begins and ends runs -----------------------------===//
 
 #include "cpu/CPUExecutor.h"
-#include "cpu/Check.h"
-#include "cpu/Cycle.h"
-#include "cpu/Mirrors.h"
-#include "cpu/Strips.h"
+#include "cpu/check/Check.h"
+#include "cpu/loops/Cycle.h"
+#include "cpu/loops/Strips.h"
+#include "cpu/state/Mirrors.h"
 
 #include <algorithm>
 

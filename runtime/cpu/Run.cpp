@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Run.cpp - Begins and ends kernels ----------------------------------===//
 
-#include "cpu/Check.h"
-#include "cpu/Cycle.h"
-#include "cpu/Mirrors.h"
-#include "cpu/PrivateCopies.h"
-#include "cpu/PrivateImages.h"
-#include "cpu/Strips.h"
+#include "cpu/check/Check.h"
+#include "cpu/loops/Cycle.h"
+#include "cpu/loops/Strips.h"
+#include "cpu/state/Mirrors.h"
+#include "cpu/state/PrivateCopies.h"
+#include "cpu/state/PrivateImages.h"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 //===- Serial.cpp - Launches that are too small for threads ---------------===//
 
 #include "cpu/Serial.h"
-#include "cpu/Mirrors.h"
+#include "cpu/state/Mirrors.h"
 
 #include <algorithm>
 

@@ -2,9 +2,9 @@
 //===- CudaExecutor.cpp - Runs a pipeline on a CUDA device ----------------===//
 
 #include "cuda/CudaExecutor.h"
-#include "cpu/Cycle.h"
-#include "cpu/Mirrors.h"
-#include "cpu/Strips.h"
+#include "cpu/loops/Cycle.h"
+#include "cpu/loops/Strips.h"
+#include "cpu/state/Mirrors.h"
 
 using namespace piko::cuda;
 using namespace piko::rt;

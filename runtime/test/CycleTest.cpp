@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- CycleTest.cpp - Loops and rounds against the sequential meaning ----===//
 
-#include "Graph.h"
+#include "graph/Graph.h"
 
 #include <functional>
 #include <gtest/gtest.h>

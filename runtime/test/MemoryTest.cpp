@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- MemoryTest.cpp - Reuse of memory, and running out of it ------------===//
 
-#include "Graph.h"
+#include "graph/Graph.h"
 
 #include <gtest/gtest.h>
 

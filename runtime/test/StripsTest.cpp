@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- StripsTest.cpp - Sources in strips, and memory budgets -------------===//
 
-#include "Graph.h"
+#include "graph/Graph.h"
 
 #include "pikort/pikort.h"
 

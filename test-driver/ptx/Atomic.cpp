@@ -5,9 +5,9 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "ptx/Access.h"
-#include "ptx/Decoder.h"
 #include "ptx/Machine.h"
+#include "ptx/memory/Access.h"
+#include "ptx/text/Decoder.h"
 
 #include <algorithm>
 #include <cstring>

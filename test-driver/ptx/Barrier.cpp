@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Barrier.cpp - Barriers and sleeps of PTX ---------------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 using namespace piko::ptx;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Body.cpp - Parser of the body of a function of PTX -----------------===//
 
-#include "ptx/Parser.h"
+#include "ptx/text/Parser.h"
 
 #include <bit>
 #include <set>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Compare.cpp - Comparisons and selections of PTX --------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Half.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 #include <cmath>
 #include <type_traits>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Control.cpp - Branches, calls and returns of PTX -------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
 #include "ptx/Machine.h"
+#include "ptx/text/Decoder.h"
 
 #include <cstring>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Convert.cpp - Conversions of PTX -----------------------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Half.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 #include <cfenv>
 #include <cmath>

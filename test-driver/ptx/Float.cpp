@@ -7,8 +7,8 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 #include <bit>
 #include <cmath>

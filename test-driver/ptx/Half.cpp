@@ -2,8 +2,8 @@
 //===- Half.cpp - Arithmetic of PTX on f16 --------------------------------===//
 
 #include "ptx/Half.h"
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 using namespace piko::ptx;
 

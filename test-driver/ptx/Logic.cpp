@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Logic.cpp - Bits and shifts of PTX ---------------------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 #include <algorithm>
 #include <type_traits>

@@ -4,9 +4,9 @@
 #ifndef PIKO_TEST_DRIVER_PTX_MACHINE_H
 #define PIKO_TEST_DRIVER_PTX_MACHINE_H
 
-#include "ptx/Footprint.h"
-#include "ptx/StoreBuffer.h"
 #include "ptx/Warp.h"
+#include "ptx/memory/Footprint.h"
+#include "ptx/memory/StoreBuffer.h"
 
 #include <initializer_list>
 #include <memory>

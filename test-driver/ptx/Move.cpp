@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Move.cpp - Moves of PTX, packing, and addresses of spaces ----------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 using namespace piko::ptx;
 

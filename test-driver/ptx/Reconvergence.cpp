@@ -7,7 +7,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "ptx/Program.h"
+#include "ptx/text/Program.h"
 
 #include <algorithm>
 

@@ -13,7 +13,7 @@
 #ifndef PIKO_TEST_DRIVER_PTX_SCOREBOARD_H
 #define PIKO_TEST_DRIVER_PTX_SCOREBOARD_H
 
-#include "ptx/Program.h"
+#include "ptx/text/Program.h"
 
 #include <array>
 #include <utility>

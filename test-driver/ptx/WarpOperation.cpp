@@ -6,8 +6,8 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "ptx/Decoder.h"
 #include "ptx/Lanes.h"
+#include "ptx/text/Decoder.h"
 
 #include <algorithm>
 #include <cstring>

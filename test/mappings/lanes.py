@@ -7,7 +7,7 @@
   lanes.py [options] --write   writes lanes.md anew
 
 A row is a stage that has a kernel: what piko-map-lanes gives lanes, and, by
-processor, what piko-vectorize makes of its loops, as `pikoc --explain` says it:
+processor, what piko-plan-vectors makes of its loops, as `pikoc --explain` says it:
 
   16 primitives              at once
   16 or 1 primitives, as measured   both are there, and the runtime takes the faster
@@ -90,7 +90,9 @@ def list_mappings(report):
 def list_loops(report):
     """What became of the loops of each stage, each once."""
     loops = {}
-    for line, column, stage, text, notes in read_remarks(report, "piko-vectorize"):
+    remarks = [remark for step in ("piko-lockstep", "piko-plan-vectors")
+               for remark in read_remarks(report, step)]
+    for line, column, stage, text, notes in remarks:
         said = [shorten(text)]
         said += [word for note, word in NOTES.items() if any(note in it for it in notes)]
         loops.setdefault(stage, {})[line, column, ", ".join(said)] = None

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-#include "KnownFiles.h"
+#include "Cache/KnownFiles.h"
 #include "../Support/TemporaryFolder.h"
 
 #include "llvm/Support/MemoryBuffer.h"

@@ -2,7 +2,7 @@
 //
 // Which loads are repeated where they are broadcast, and which may not be.
 
-#include "../../lib/Target/CPU/BroadcastLoads.h"
+#include "Passes/BroadcastLoads.h"
 
 #include "PassTest.h"
 

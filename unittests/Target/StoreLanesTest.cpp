@@ -2,7 +2,7 @@
 //
 // Narrow numbers that lanes store are taken out of their vector together.
 
-#include "../../lib/Target/CPU/StoreLanes.h"
+#include "Passes/StoreLanes.h"
 #include "PassTest.h"
 
 #include "llvm/IR/InstIterator.h"

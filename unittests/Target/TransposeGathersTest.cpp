@@ -2,7 +2,7 @@
 //
 // Gathers of words side by side become loads of four words and transpositions.
 
-#include "../../lib/Target/CPU/TransposeGathers.h"
+#include "Passes/TransposeGathers.h"
 #include "PassTest.h"
 
 #include "llvm/IR/InstIterator.h"

@@ -2,7 +2,7 @@
 //
 // Gathers from one place become one masked load; others stay.
 
-#include "../../lib/Target/CPU/UniformGathers.h"
+#include "Passes/UniformGathers.h"
 #include "PassTest.h"
 
 #include "llvm/IR/InstIterator.h"

@@ -13,7 +13,7 @@ struct CPUOptions {
   /// Lanes of a vector, 4, 8 or 16: as many numbers of 32 bits as a register of
   /// the processor holds.
   int64_t lanes = 16;
-  /// For who fits the cost model: see piko-vectorize.
+  /// For who fits the cost model: see piko-plan-vectors.
   bool printsSensitivities = false;
 };
 

@@ -39,7 +39,7 @@ void addCPUSequence(mlir::OpPassManager &passes,
 void addScalarSequence(mlir::OpPassManager &passes,
                        const SynthesisOptions &options);
 
-/// The rest of it, from piko-vectorize on.
+/// The rest of it, from piko-narrow-integers on.
 void addVectorSequence(mlir::OpPassManager &passes,
                        const SynthesisOptions &options, const CPUOptions &cpu);
 

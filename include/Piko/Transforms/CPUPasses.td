@@ -98,7 +98,7 @@ def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
   let summary = "Read before a loop what its condition reads";
   let description = [{
     **Requires** loops over units (`piko-form-units`); before `piko-hoist-bounds` and
-    `piko-vectorize`, which look for loops with a bound that is known before them.
+    `piko-plan-vectors`, which look for loops with a bound that is known before them.
 
     **Does**: loop-invariant code motion. A loop's condition may read a number from
     state without an index, as an extent that the user keeps with a buffer. If the

@@ -371,7 +371,7 @@ def SplitLoops : Pass<"piko-split-loops", "::piko::PipelineOp"> {
     Reductions, scans and sorts become loops over slots.
 
     A `piko.parallel_for` with a constant count of at most `lockstep` is left to
-    `piko-vectorize`, as lanes of one vector.
+    `piko-lockstep`, as lanes of one vector.
 
     **Guarantees** that barriers see all that iterations did before, and that
     emissions keep their order.

@@ -58,22 +58,112 @@ def NarrowIntegers : Pass<"piko-narrow-integers", "::piko::PipelineOp"> {
            "lanes of a vector, which a strip has as columns; 0: no strips">];
 }
 
-def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
-  let summary = "Run primitives, or iterations, as lanes of vectors";
+def Lockstep : Pass<"piko-lockstep", "::piko::PipelineOp"> {
+  let summary = "Run iterations that meet at barriers as lanes";
+  let description = [{
+    **Requires** loops over units; `piko-split-loops` with `lockstep`, which leaves
+    parallel loops of few iterations to this pass.
+
+    **Does**: a `piko.parallel_for` with barriers, of up to 16 iterations, becomes one
+    vector, whose lanes run in lockstep. A barrier is then nothing, a collective a
+    reduction or a scan of the vector. What has no such form, or would take longer, is
+    cut into loops between barriers, by loop fission.
+
+    **Guarantees** the same order between iterations as barriers give.
+
+    Before:
+    ```
+    piko.parallel_for %c16 {
+    ^bb0(%i: index):
+      %some = arith.cmpf olt, %v, %z : f32
+      %any = piko.reduce %some : i1 { ... arith.ori ... }
+      ...
+    }
+    ```
+    After:
+    ```
+    %some = arith.cmpf olt, %v, %z : vector<16xf32>
+    %any = vector.reduction <or>, %some : vector<16xi1> into i1
+    ...
+    ```
+
+    **Limits**: a number of iterations that is known; loops around them have one version
+    (`piko.barriers`).
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect",
+                           "::mlir::vector::VectorDialect"];
+}
+
+def PlanVectors : Pass<"piko-plan-vectors", "::piko::PipelineOp"> {
+  let summary = "Decide which loops become vectors, and shape these";
   let description = [{
     **Requires** loops over units with checked access to state (`convert-piko-to-scf`),
     and a mapping of lanes (`piko-map-lanes`).
 
-    **Does**: runs `lanes` iterations of a loop over primitives, of a `parallelFor` or
-    of a row of pixels at once. What lanes share stays scalar; the rest becomes vectors,
-    by predication. Access becomes gathers and scatters, or masked loads and stores of
-    rows. Inner loops whose iterations differ between lanes are collapsed or flattened
-    where that pays. What is ordered, or has no vector form, runs lane by lane. A cost
-    model decides unless `specifyLanes` does, and remarks say why. With a `window`,
-    loops with close estimates become two versions (`piko.cpu.takes_vectors`).
+    **Does**: compares vectors with scalar code by a cost model, unless `specifyLanes`
+    decides, for loops over primitives, parallel loops, and loops in order whose
+    iterations are independent. Those that win are marked for `piko-vectorize`. First,
+    inner loops that lanes leave at different times are flattened or collapsed, and
+    iterations with nothing to do taken out by stream compaction, where that pays. Short
+    loops keep a scalar version. With a `window`, loops with close estimates have two
+    versions (`piko.cpu.takes_vectors`). Remarks say why.
+
+    **Guarantees** the same operations for each iteration, in order where it shows.
+
+    Before:
+    ```
+    scf.for %x = %lo to %hi step %c1 { ... } {piko.lanes}
+    ```
+    After:
+    ```
+    scf.if %is_long {
+      scf.for %x = %lo to %hi step %c1 { ... } {piko.lanes, piko.vector_lanes = 16}
+    } else {
+      scf.for %x = %lo to %hi step %c1 { ... }
+    }
+    ```
+
+    **Limits**: loops whose iterations hand on values, use views of memory, or have more
+    than 16 KiB of arrays stay scalar.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+  let options = [
+    Option<"laneCount", "lanes", "int64_t", "16",
+           "Lanes of a vector: 4, 8 or 16 (default: 16)">,
+    Option<"inTurns", "turns", "bool", "false",
+           "only loops of what lanes do in turns, after piko-vectorize">,
+    Option<"flattens", "flatten", "bool", "true",
+           "flatten nests that lanes leave at different times">,
+    Option<"compacts", "compact", "bool", "true",
+           "compact loops of which some iterations have nothing to do">,
+    Option<"window", "window", "double", "1",
+           "hold a loop as vectors and as a scalar loop, of which the runtime runs "
+           "what is faster, where estimates are within this factor of each other "
+           "(default: 1, none)">,
+    Option<"sensitivities", "sensitivities", "bool", "false",
+           "print the estimates of such loops, and how they depend on the numbers "
+           "of the cost model, as lines of JSON">
+  ];
+}
+
+def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
+  let summary = "Run primitives, or iterations, as lanes of vectors";
+  let description = [{
+    **Requires** loops that `piko-plan-vectors` has marked with a number of lanes.
+
+    **Does**: runs that many iterations at once. What lanes share stays scalar; the rest
+    becomes vectors, by predication. Access becomes gathers and scatters, or masked
+    loads and stores of rows. What is ordered, or has no vector form, runs lane by lane,
+    in a loop marked `piko.turns`, which may be planned again. A mark on what cannot
+    become vectors is an error.
 
     **Guarantees** the same operations for each iteration, emissions and updates in
-    order, and the same bits for any `lanes`.
+    order, and the same bits for any number of lanes.
 
     Before:
     ```
@@ -84,7 +174,7 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
       scf.if %nearer {
         piko.store %z, checked @depth[%x, %y : index, index] "z" : f32
       }
-    } {piko.lanes}
+    } {piko.lanes, piko.vector_lanes = 16}
     ```
     After:
     ```
@@ -103,25 +193,13 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: loops whose iterations hand on values, use views of memory, or have more
-    than 16 KiB of arrays stay scalar.
+    **Limits**: 4, 8, 16 or 32 lanes.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::math::MathDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect",
                            "::mlir::vector::VectorDialect"];
-  let options = [
-    Option<"laneCount", "lanes", "int64_t", "16",
-           "Lanes of a vector: 4, 8 or 16 (default: 16)">,
-    Option<"window", "window", "double", "1",
-           "hold a loop as vectors and as a scalar loop, of which the runtime runs "
-           "what is faster, where estimates are within this factor of each other "
-           "(default: 1, none)">,
-    Option<"sensitivities", "sensitivities", "bool", "false",
-           "print the estimates of such loops, and how they depend on the numbers "
-           "of the cost model, as lines of JSON">
-  ];
 }
 
 def DistributeLoops : Pass<"piko-distribute-loops", "::piko::PipelineOp"> {

@@ -3,7 +3,7 @@
 
 #include "Parse/PhaseNames.h"
 
-#include "Parse/ClangDiagnostics.h"
+#include "Clang/ClangDiagnostics.h"
 #include "clang/AST/ASTContext.h"
 #include "clang/AST/DeclTemplate.h"
 

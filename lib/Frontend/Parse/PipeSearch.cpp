@@ -8,8 +8,8 @@
 
 #include "Parse/PipeSearch.h"
 
-#include "Parse/ClangDiagnostics.h"
 #include "Parse/LanguageTypes.h"
+#include "Clang/ClangDiagnostics.h"
 #include "clang/Basic/SourceManager.h"
 #include "clang/Sema/Sema.h"
 #include "llvm/ADT/StringMap.h"

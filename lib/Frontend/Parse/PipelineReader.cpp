@@ -3,10 +3,10 @@
 
 #include "Parse/PipelineReader.h"
 
-#include "Parse/ClangDiagnostics.h"
 #include "Parse/LanguageTypes.h"
 #include "Parse/PhaseNames.h"
 #include "mlir/IR/Diagnostics.h"
+#include "Clang/ClangDiagnostics.h"
 #include "clang/AST/RecordLayout.h"
 #include "clang/Basic/SourceManager.h"
 

@@ -3,9 +3,9 @@
 #ifndef PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
 #define PIKO_LIB_FRONTEND_PARSE_PIPELINEREADER_H
 
-#include "Parse/InitialValues.h"
 #include "Parse/PipeSearch.h"
 #include "Parse/RecordLayout.h"
+#include "Values/InitialValues.h"
 #include "clang/AST/DeclCXX.h"
 
 namespace piko {

@@ -9,8 +9,8 @@
 
 #include "Parse/RecordLayout.h"
 
-#include "Parse/ClangDiagnostics.h"
 #include "Parse/CppTypes.h"
+#include "Clang/ClangDiagnostics.h"
 #include "clang/AST/DeclCXX.h"
 #include "clang/AST/RecordLayout.h"
 

@@ -9,7 +9,7 @@
 //===----------------------------------------------------------------------===//
 #include "Parse/Tunables.h"
 
-#include "Parse/ClangDiagnostics.h"
+#include "Clang/ClangDiagnostics.h"
 #include "clang/AST/Expr.h"
 #include "clang/AST/RecursiveASTVisitor.h"
 #include "clang/Basic/SourceManager.h"

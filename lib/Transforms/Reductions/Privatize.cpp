@@ -6,7 +6,7 @@
 // Copies are combined for runs of elements that have been written to, by a
 // function that convert-piko-to-llvm makes for the field and the kind, and hold
 // what changes nothing after that, as the next launch needs them
-// (runtime/cpu/PrivateCopies.h).
+// (runtime/cpu/state/PrivateCopies.h).
 
 #include "Reductions/UnitWork.h"
 

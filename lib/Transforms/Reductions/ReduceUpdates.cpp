@@ -8,7 +8,7 @@
 // bin otherwise, unless each primitive updates one pixel that is known before
 // (piko-own-pixels). What threads hold is combined by a function that
 // convert-piko-to-llvm makes; the first thread has the state itself
-// (runtime/cpu/PrivateImages.h).
+// (runtime/cpu/state/PrivateImages.h).
 
 #include "Deferral/InternalImage.h"
 #include "Reductions/CommutingUpdates.h"

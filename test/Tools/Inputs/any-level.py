@@ -17,7 +17,8 @@ STEPS = [f"piko.pipeline(piko-{name})" for name in IN_PIPELINE]
 STEPS.insert(5, "piko-prune")
 # Where tiles are does not show.
 STEPS += ["piko.pipeline(convert-piko-to-scf{private-tiles=true})"]
-STEPS += ["piko.pipeline(piko-vectorize)"]
+STEPS += [f"piko.pipeline(piko-{name})"
+          for name in ("lockstep", "plan-vectors", "vectorize")]
 STEPS += ["piko.pipeline(convert-piko-to-openmp)", "convert-piko-to-llvm"]
 STEPS += ["convert-scf-to-cf-in-reverse,convert-vector-to-llvm,convert-math-to-llvm"]
 STEPS += ["convert-ub-to-llvm,convert-openmp-to-llvm"]

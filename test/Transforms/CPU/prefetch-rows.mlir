@@ -1,5 +1,5 @@
 // RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-prefetch),canonicalize,cse)' %s | FileCheck %s
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-prefetch,convert-piko-to-scf,canonicalize,cse,piko-vectorize{lanes=4}),canonicalize,cse)' %s | FileCheck %s --check-prefix=LANES
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-prefetch,convert-piko-to-scf,canonicalize,cse,piko-plan-vectors{lanes=4},piko-vectorize),canonicalize,cse)' %s | FileCheck %s --check-prefix=LANES
 
 piko.record @Tick {"v" : i32 at 0} size 4 align 4
 piko.record @Key {"v" : i32 at 0} size 4 align 4

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors,piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
 
 piko.record @B {"w" : i32 at 0, "h" : i32 at 4, "z" : f32 at 8} size 12 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4

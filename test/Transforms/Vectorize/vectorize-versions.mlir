@@ -1,6 +1,6 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{window=2}),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{window=1000}),canonicalize,cse)' --split-input-file %s 2>/dev/null | FileCheck %s --check-prefix=WIDE
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize{window=2 sensitivities=true}))' --split-input-file -o %t.mlir %s 2>/dev/null | FileCheck %s --check-prefix=NUMBERS
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors{window=2},piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors{window=1000},piko-vectorize),canonicalize,cse)' --split-input-file %s 2>/dev/null | FileCheck %s --check-prefix=WIDE
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors{window=2 sensitivities=true},piko-vectorize))' --split-input-file -o %t.mlir %s 2>/dev/null | FileCheck %s --check-prefix=NUMBERS
 
 piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4

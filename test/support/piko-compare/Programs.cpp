@@ -2,6 +2,7 @@
 
 #include "Programs.h"
 
+#include "Cache/SourceCache.h"
 #include "ObjectRequest.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 #include "Piko/Driver/Compiler.h"
@@ -11,7 +12,6 @@
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Processor.h"
 #include "ReferenceObject.h"
-#include "SourceCache.h"
 #include "mlir/Bytecode/BytecodeWriter.h"
 #include "mlir/Parser/Parser.h"
 

@@ -83,14 +83,15 @@ static StringRef getExpectedKind(StringRef name) {
       .Cases({marks::lanes, marks::rows, marks::shared, marks::disjoint,
               marks::again, marks::reordered, marks::rare, marks::fails,
               marks::input, marks::shortCircuit, marks::inside, marks::source,
-              marks::versions},
+              marks::versions, marks::turns, marks::barriers},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")
       .Case(marks::threads, "how threads share work, as #piko<threads shared>")
       .Case(marks::steps, "an array of steps, such as #piko.step<clear 0>")
-      .Cases({marks::number, marks::blockSize, marks::fewest},
-             "a 64-bit integer")
+      .Cases(
+          {marks::number, marks::blockSize, marks::fewest, marks::vectorLanes},
+          "a 64-bit integer")
       .Cases({marks::iterations, marks::advances, marks::probability},
              "a 64-bit float")
       .Case(marks::probabilities, "an array of 64-bit floats")
@@ -120,7 +121,7 @@ static bool hasExpectedKind(NamedAttribute attribute) {
       name == marks::probability)
     return isa<FloatAttr>(value) && cast<FloatAttr>(value).getType().isF64();
   if (name == marks::number || name == marks::blockSize ||
-      name == marks::fewest)
+      name == marks::fewest || name == marks::vectorLanes)
     return isa<IntegerAttr>(value) &&
            cast<IntegerAttr>(value).getType().isInteger(64);
   return isa<UnitAttr>(value);

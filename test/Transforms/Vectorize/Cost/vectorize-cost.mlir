@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize))' --split-input-file --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors,piko-vectorize))' --split-input-file --verify-diagnostics %s
 
 piko.record @Row {"z" : f32[32 : 4] at 0, "k" : i32 at 128} size 132 align 4
 piko.record @D {"z" : f32 at 0} size 4 align 4

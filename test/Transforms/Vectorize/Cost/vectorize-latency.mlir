@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize,canonicalize,cse))' --split-input-file --verify-diagnostics %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors,piko-vectorize,canonicalize,cse))' --split-input-file --verify-diagnostics %s | FileCheck %s
 
 piko.record @P {"x" : f32 at 0, "index" : i32 at 4} size 8 align 4
 piko.record @V {"z" : f32 at 0} size 4 align 4

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors,piko-vectorize),canonicalize,cse)' --split-input-file --verify-diagnostics %s | FileCheck %s
 
 piko.record @P {"k" : i32 at 0, "n" : i32 at 4} size 8 align 4
 piko.record @N {"n" : i32 at 0} size 4 align 4

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-vectorize,canonicalize,cse))' --split-input-file %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-plan-vectors,piko-vectorize,canonicalize,cse))' --split-input-file %s | FileCheck %s
 
 piko.record @V {"z" : f32 at 0} size 4 align 4
 

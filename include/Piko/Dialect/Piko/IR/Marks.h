@@ -16,6 +16,12 @@ constexpr llvm::StringLiteral lanes = "piko.lanes";
 /// A loop over rows of pixels, around one whose iterations lanes may share: all
 /// of these pixels may be visited in any order.
 constexpr llvm::StringLiteral rows = "piko.rows";
+/// A loop that becomes vectors of so many lanes: a 64-bit integer.
+constexpr llvm::StringLiteral vectorLanes = "piko.vector_lanes";
+/// A loop over the lanes of a vector that take turns.
+constexpr llvm::StringLiteral turns = "piko.turns";
+/// A loop around one whose iterations meet at barriers.
+constexpr llvm::StringLiteral barriers = "piko.barriers";
 /// What lanes are given, a `LaneMappingAttr`, of a loop over primitives.
 constexpr llvm::StringLiteral mapping = "piko.mapping";
 /// An scf.if between the versions of a loop over primitives; they become

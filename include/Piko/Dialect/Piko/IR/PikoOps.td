@@ -5,13 +5,13 @@
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOOPS_TD
 
-include "Piko/Dialect/Piko/IR/PikoPipelineOps.td"
-include "Piko/Dialect/Piko/IR/PikoStageOps.td"
-include "Piko/Dialect/Piko/IR/PikoAssignOps.td"
-include "Piko/Dialect/Piko/IR/PikoBodyOps.td"
-include "Piko/Dialect/Piko/IR/PikoStateOps.td"
-include "Piko/Dialect/Piko/IR/PikoLoopOps.td"
-include "Piko/Dialect/Piko/IR/PikoKernelOps.td"
-include "Piko/Dialect/Piko/IR/PikoMachineOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoPipelineOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoStageOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoAssignOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoBodyOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoStateOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoLoopOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoKernelOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoMachineOps.td"
 
 #endif // PIKO_DIALECT_PIKO_IR_PIKOOPS_TD

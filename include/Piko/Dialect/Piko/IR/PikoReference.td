@@ -3,10 +3,10 @@
 // All of the dialect, for its reference document.
 
 include "Piko/Dialect/Piko/IR/PikoOps.td"
-include "Piko/Dialect/Piko/IR/PikoCheckOps.td"
-include "Piko/Dialect/Piko/IR/PikoCountOps.td"
-include "Piko/Dialect/Piko/IR/PikoFixedOps.td"
-include "Piko/Dialect/Piko/IR/PikoCPUOps.td"
-include "Piko/Dialect/Piko/IR/PikoProgramOps.td"
-include "Piko/Dialect/Piko/IR/PikoGPUOps.td"
-include "Piko/Dialect/Piko/IR/PikoApproximationOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoCheckOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoCountOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoFixedOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoCPUOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoProgramOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoGPUOps.td"
+include "Piko/Dialect/Piko/IR/Ops/PikoApproximationOps.td"

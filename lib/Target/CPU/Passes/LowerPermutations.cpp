@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Passes/LowerPermutations.h"
+
+#include "Piko/Conversion/Permutations.h"
+
+#include "llvm/ADT/STLExtras.h"
+#include "llvm/ADT/Sequence.h"
+#include "llvm/CodeGen/TargetSubtargetInfo.h"
+#include "llvm/IR/IRBuilder.h"
+#include "llvm/IR/IntrinsicsX86.h"
+
+using namespace llvm;
+using namespace piko;
+
+namespace {
+
+/// What x86 has for so many lanes of 32 bits.
+struct WordPermutation {
+  unsigned lanes;
+  StringLiteral feature;
+  Intrinsic::ID id;
+};
+
+constexpr WordPermutation wordPermutations[] = {
+    {16, "+avx512f", Intrinsic::x86_avx512_permvar_si_512},
+    {8, "+avx2", Intrinsic::x86_avx2_permd},
+    {4, "+avx", Intrinsic::x86_avx_vpermilvar_ps},
+    {4, "+ssse3", Intrinsic::x86_ssse3_pshuf_b_128}};
+
+/// Writes what stands for one permutation.
+class PermutationWriter {
+public:
+  /// Before the call.
+  PermutationWriter(CallInst *call, const TargetMachine &machine);
+  Value *write() { return permute(call->getArgOperand(0)); }
+
+private:
+  Value *permute(Value *vector);
+  Value *permuteWords(Value *vector);
+  Value *permuteDoubleWords(Value *vector);
+  Value *permuteHalves(Value *vector);
+  Value *permuteInMemory(Value *vector);
+
+  CallInst *call;
+  IRBuilder<> builder;
+  Value *lanes;
+  unsigned count;
+  const WordPermutation *instruction = nullptr; ///< if there is one
+};
+
+} // namespace
+
+PermutationWriter::PermutationWriter(CallInst *call,
+                                     const TargetMachine &machine)
+    : call(call), builder(call), lanes(call->getArgOperand(1)),
+      count(cast<FixedVectorType>(lanes->getType())->getNumElements()) {
+  if (!machine.getTargetTriple().isX86())
+    return;
+  const TargetSubtargetInfo &processor =
+      *machine.getSubtargetImpl(*call->getFunction());
+  instruction = find_if(wordPermutations, [&](const WordPermutation &one) {
+    return one.lanes == count && processor.checkFeatures(one.feature.str());
+  });
+  if (instruction == std::end(wordPermutations))
+    instruction = nullptr;
+}
+
+/// Of 32 bits, by the instruction. All but that for bytes take a lane modulo
+/// the number of lanes.
+Value *PermutationWriter::permuteWords(Value *vector) {
+  Type *type = vector->getType();
+  if (instruction->id == Intrinsic::x86_avx_vpermilvar_ps) {
+    auto *floats = FixedVectorType::get(builder.getFloatTy(), count);
+    Value *moved = builder.CreateIntrinsic(
+        instruction->id, {builder.CreateBitCast(vector, floats), lanes});
+    return builder.CreateBitCast(moved, type);
+  }
+  if (instruction->id != Intrinsic::x86_ssse3_pshuf_b_128)
+    return builder.CreateIntrinsic(instruction->id, {vector, lanes});
+  // The bytes of a word are those of a lane, from the lowest on.
+  auto *bytes = FixedVectorType::get(builder.getInt8Ty(), 4 * count);
+  SmallVector<int> lowest;
+  SmallVector<uint8_t> offsets;
+  for (unsigned byte = 0; byte < 4 * count; ++byte) {
+    lowest.push_back(int(byte / 4 * 4));
+    offsets.push_back(byte % 4);
+  }
+  Value *which = builder.CreateAnd(lanes, count - 1);
+  which = builder.CreateShl(which, 2);
+  which =
+      builder.CreateShuffleVector(builder.CreateBitCast(which, bytes), lowest);
+  which = builder.CreateOr(
+      which, ConstantDataVector::get(builder.getContext(), offsets));
+  Value *moved = builder.CreateIntrinsic(
+      instruction->id, {builder.CreateBitCast(vector, bytes), which});
+  return builder.CreateBitCast(moved, type);
+}
+
+/// Of 64 bits, where two registers hold the vector, of which one instruction
+/// takes what it needs.
+Value *PermutationWriter::permuteDoubleWords(Value *vector) {
+  auto getHalf = [&](Value *whole, unsigned first) {
+    return builder.CreateShuffleVector(
+        whole, to_vector(seq<int>(first, first + count / 2)));
+  };
+  Value *wide = builder.CreateZExt(lanes, vector->getType());
+  Value *low = getHalf(vector, 0), *high = getHalf(vector, count / 2);
+  Value *moved[2];
+  for (unsigned half : {0, 1})
+    moved[half] =
+        builder.CreateIntrinsic(Intrinsic::x86_avx512_vpermi2var_q_512,
+                                {low, getHalf(wide, half * count / 2), high});
+  return builder.CreateShuffleVector(moved[0], moved[1],
+                                     to_vector(seq<int>(0, count)));
+}
+
+/// Of 64 bits, as words, of which a vector holds as many as there are lanes.
+Value *PermutationWriter::permuteHalves(Value *vector) {
+  auto *words = FixedVectorType::get(builder.getInt32Ty(), 2 * count);
+  Value *all = builder.CreateBitCast(vector, words);
+  SmallVector<int> low, high, mix;
+  for (unsigned lane = 0; lane < count; ++lane) {
+    low.push_back(int(2 * lane));
+    high.push_back(int(2 * lane + 1));
+    mix.append({int(lane), int(count + lane)});
+  }
+  Value *lows = permuteWords(builder.CreateShuffleVector(all, low));
+  Value *highs = permuteWords(builder.CreateShuffleVector(all, high));
+  return builder.CreateBitCast(builder.CreateShuffleVector(lows, highs, mix),
+                               vector->getType());
+}
+
+Value *PermutationWriter::permuteInMemory(Value *vector) {
+  auto *type = cast<FixedVectorType>(vector->getType());
+  BasicBlock &entry = call->getFunction()->getEntryBlock();
+  auto *slot = IRBuilder<>(&entry, entry.begin()).CreateAlloca(type);
+  builder.CreateStore(vector, slot);
+  Value *which = builder.CreateAnd(lanes, count - 1);
+  Value *moved = PoisonValue::get(type);
+  for (unsigned lane = 0; lane < count; ++lane) {
+    Value *index = builder.CreateZExt(builder.CreateExtractElement(which, lane),
+                                      builder.getInt64Ty());
+    Value *place =
+        builder.CreateInBoundsGEP(type->getElementType(), slot, index);
+    moved = builder.CreateInsertElement(
+        moved, builder.CreateLoad(type->getElementType(), place), lane);
+  }
+  return moved;
+}
+
+Value *PermutationWriter::permute(Value *vector) {
+  Type *type = vector->getType();
+  if (!instruction)
+    return permuteInMemory(vector);
+  unsigned width = type->getScalarSizeInBits();
+  if (width == 64)
+    return instruction->id == Intrinsic::x86_avx512_permvar_si_512
+               ? permuteDoubleWords(vector)
+               : permuteHalves(vector);
+  Value *words = builder.CreateZExt(
+      vector, FixedVectorType::get(builder.getInt32Ty(), count));
+  return builder.CreateTrunc(permuteWords(words), type);
+}
+
+void piko::lowerPermutations(Module &module, const TargetMachine &machine) {
+  for (Function &function : make_early_inc_range(module)) {
+    if (!function.getName().starts_with(permutationPrefix))
+      continue;
+    for (User *user : make_early_inc_range(function.users())) {
+      auto *call = cast<CallInst>(user);
+      call->replaceAllUsesWith(PermutationWriter(call, machine).write());
+      call->eraseFromParent();
+    }
+    function.eraseFromParent();
+  }
+}
