@@ -41,25 +41,6 @@ DeviceFrame::LoopSteps DeviceFrame::loopAt(size_t at) const {
   return loop;
 }
 
-const pikoir_cuda_step *DeviceFrame::entryOf(int32_t stage) const {
-  auto found = std::find_if(
-      loop_.entries.begin(), loop_.entries.end(),
-      [&](const pikoir_cuda_step *entry) { return entry->number == stage; });
-  return found == loop_.entries.end() ? nullptr : *found;
-}
-
-std::vector<QueuePort> DeviceFrame::describePorts(Steps queues) const {
-  std::vector<QueuePort> ports;
-  for (const pikoir_cuda_step &step : queues) {
-    const Edge &edge = p_.edges[step.number];
-    if (hasQueue(edge))
-      ports.push_back(
-          {describeEdge(step.number), describeShape(p_.stages[edge.consumer]),
-           onDevice(&queues_[step.number]), step.exit, step.member});
-  }
-  return ports;
-}
-
 void DeviceFrame::queue(const KernelPlace &place, Steps queues) {
   std::vector<QueuePort> ports = describePorts(queues);
   if (ports.empty())
@@ -108,19 +89,6 @@ StepArgs &DeviceFrame::takeStep(const std::vector<QueueState *> &waiting) {
   return args;
 }
 
-/// What a stage takes of such a loop.
-std::vector<JoinInput> DeviceFrame::describeWave(int32_t number) const {
-  const Stage &stage = p_.stages[number];
-  std::vector<JoinInput> inputs = describeInputs(stage);
-  std::erase_if(inputs, [](const JoinInput &input) { return !input.isInLoop; });
-  if (entryOf(number)) {
-    JoinInput &entries = inputs.emplace_back();
-    entries.queue = onDevice(&entriesOf(number));
-    entries.isInLoop = true;
-  }
-  return inputs;
-}
-
 void DeviceFrame::enter() {
   std::vector<LoopEntry> entries;
   std::vector<JoinInput> inputs;
@@ -146,28 +114,6 @@ void DeviceFrame::enter() {
     args.stack = onDevice(stack_);
   }
   launchOwn("piko_enter", &args);
-}
-
-StackArgs &DeviceFrame::describeStack() {
-  std::vector<StackMember> members;
-  std::vector<QueuePort> ports;
-  for (const LoopSteps::Member &member : loop_.members) {
-    std::vector<QueuePort> ofStage = describePorts(member.queues);
-    const Stage &stage = p_.stages[member.stage];
-    members.push_back({onDevice(&find(member.stage, false).state),
-                       describeShape(stage), stage.tiles,
-                       static_cast<int32_t>(ports.size()),
-                       static_cast<int32_t>(ofStage.size())});
-    ports.insert(ports.end(), ofStage.begin(), ofStage.end());
-  }
-  auto &args = exchange_.takeWith<StackArgs>(members, ports);
-  args.frame = onDevice(frame_);
-  args.loop = onDevice(&loops_[loop_.number]);
-  args.stack = onDevice(&stackStates_[loop_.number]);
-  args.limit = p_.loopLimit;
-  args.memberCount = static_cast<int32_t>(members.size());
-  args.portCount = static_cast<int32_t>(ports.size());
-  return args;
 }
 
 void DeviceFrame::endPosition() {

@@ -29,29 +29,6 @@ void DeviceFrame::beginStrips(int32_t group, int64_t size) {
     repeat(strips.state->again);
 }
 
-std::vector<StripQueue> DeviceFrame::describeLeaving(int32_t group) const {
-  std::vector<StripQueue> queues;
-  for (size_t e = 0; e < p_.edges.size(); ++e) {
-    const Edge &edge = p_.edges[e];
-    if (edge.leavesStrips && p_.stages[edge.producer].stripGroup == group)
-      queues.push_back({onDevice(&queues_[e]),
-                        p_.records[p_.stages[edge.consumer].record].size});
-  }
-  return queues;
-}
-
-/// With those of what comes into loops.
-std::vector<QueueState *> DeviceFrame::describeInside(int32_t group) const {
-  std::vector<QueueState *> queues = describeWaiting([&](const Edge &edge) {
-    return hasQueue(edge) && !edge.leavesStrips &&
-           p_.stages[edge.producer].stripGroup == group;
-  });
-  for (int32_t s : p_.stripGroups[group].stages)
-    if (p_.stages[s].loop >= 0)
-      queues.push_back(onDevice(&entriesOf(s)));
-  return queues;
-}
-
 void DeviceFrame::endStrips(int32_t group) {
   if (!strips_[static_cast<size_t>(group)].isDivided)
     return;

@@ -80,7 +80,7 @@ bool piko::hasVectorForm(Operation *op) {
   return isApproximation(op) || isa<arith::ArithDialect>(op->getDialect());
 }
 
-IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
+LaneForms::LaneForms(scf::ForOp loop, int64_t laneCount)
     : loop(loop), laneCount(laneCount),
       roots{{loop.getInductionVar(), Uniform::Iteration}},
       uniformity(loop, roots, /*isLockstep=*/true) {
@@ -88,17 +88,15 @@ IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
     if (access.getAccessKinds() != StateAccess::reads)
       written.insert(access.getAccessedState());
   });
-  analyze();
-  // What is computed of an array is another way then, and may have other
-  // iterations.
-  while (splitArraysOfIterations()) {
-    uniformity = Uniformity(loop, roots, /*isLockstep=*/true);
-    analyze();
-  }
-  checkBarriers();
 }
 
-void IterationLanes::analyze() {
+void LaneForms::split(ArrayRef<Value> arrays) {
+  for (Value array : arrays)
+    roots.emplace_back(array, Uniform::Iteration);
+  uniformity = Uniformity(loop, roots, /*isLockstep=*/true);
+}
+
+void LaneForms::findForms() {
   refusal = {};
   if (loop.getNumResults() > 0)
     refuse(loop, "it hands values from iteration to iteration");
@@ -114,35 +112,44 @@ void IterationLanes::analyze() {
   shared.clear();
   findSharedPixels();
   checkCarried();
-  groups.clear();
-  emissions.clear();
-  emitted.clear();
-  if (!refusal.at) {
-    findOrdered();
-    findEmissions();
-  }
+}
+
+IterationLanes::IterationLanes(scf::ForOp loop, int64_t laneCount)
+    : LaneOrder(loop, laneCount) {
+  analyze();
+  // What is computed of an array is another way then, and may have other
+  // iterations.
+  while (splitArraysOfIterations())
+    analyze();
+  checkBarriers();
+}
+
+void IterationLanes::analyze() {
+  findForms();
+  findOrder();
 }
 
 /// Where lanes take turns to change an array, each has a column, though it does
 /// the same as the others.
 bool IterationLanes::splitArraysOfIterations() {
-  size_t known = roots.size();
-  llvm::DenseSet<Value> found;
-  for (const OrderedGroup &group : groups)
+  llvm::SetVector<Value> found;
+  for (const OrderedGroup &group : getGroups())
     for (Operation *op : findTurns(group))
       op->walk([&](memref::StoreOp store) {
         Value array = store.getMemRef();
-        if (isPrivate(array) && !isVarying(array) && found.insert(array).second)
-          roots.emplace_back(array, Uniform::Iteration);
+        if (isPrivate(array) && !isVarying(array))
+          found.insert(array);
       });
-  return roots.size() > known;
+  if (!found.empty())
+    split(found.getArrayRef());
+  return !found.empty();
 }
 
 //===----------------------------------------------------------------------===//
 // Memory
 //===----------------------------------------------------------------------===//
 
-void IterationLanes::findArrays() {
+void LaneForms::findArrays() {
   int64_t bytes = 0;
   loop.walk([&](Operation *op) {
     if (auto array = dyn_cast<memref::AllocaOp>(op)) {
@@ -178,12 +185,12 @@ void IterationLanes::findArrays() {
   });
 }
 
-bool IterationLanes::isShort(Value array) const {
+bool LaneForms::isShort(Value array) const {
   constexpr int64_t most = 16;
   return cast<MemRefType>(array.getType()).getNumElements() <= most;
 }
 
-bool IterationLanes::readsFixed(Operation *op) const {
+bool LaneForms::readsFixed(Operation *op) const {
   if (auto load = dyn_cast<LoadOp>(op))
     return !written.contains(load.getStateAttr());
   auto load = dyn_cast<memref::LoadOp>(op);
@@ -200,12 +207,12 @@ static Value stripSignedCasts(Value value) {
   return value;
 }
 
-bool IterationLanes::isLinear(Value value) const {
+bool LaneForms::isLinear(Value value) const {
   return isSum(stripSignedCasts(value));
 }
 
 /// Sums are of one width: a narrower one may wrap, and go on from elsewhere.
-bool IterationLanes::isSum(Value value) const {
+bool LaneForms::isSum(Value value) const {
   if (stripSignedCasts(value) == loop.getInductionVar())
     return true;
   Operation *op = value.getDefiningOp();
@@ -218,7 +225,7 @@ bool IterationLanes::isSum(Value value) const {
 }
 
 /// Whether a linear value is the same in all iterations of inner loops.
-bool IterationLanes::isFixed(Value value) const {
+bool LaneForms::isFixed(Value value) const {
   if (value == loop.getInductionVar())
     return true;
   if (Operation *op = value.getDefiningOp(); op && isVarying(value))
@@ -234,7 +241,7 @@ bool IterationLanes::isFixed(Value value) const {
 /// Updates of one pixel keep their order: lanes must not meet there, neither in
 /// one operation nor in two. Where they cannot, all access to the image has the
 /// same index that differs from lane to lane, in all iterations of inner loops.
-void IterationLanes::findSharedPixels() {
+void LaneForms::findSharedPixels() {
   llvm::DenseMap<Attribute, SmallVector<Value>> apart; // by dimension, or null
   loop.walk([&](Operation *op) {
     FlatSymbolRefAttr state;
@@ -274,7 +281,7 @@ Attribute piko::getPixels(memref::StoreOp store) {
   return array ? array->getAttr(marks::pixels) : Attribute();
 }
 
-bool IterationLanes::isAccess(Operation *op) const {
+bool LaneForms::isAccess(Operation *op) const {
   if (auto load = dyn_cast<memref::LoadOp>(op))
     return load.getMemRefType().getRank() == 1 &&
            load.getMemRefType().getLayout().isIdentity() &&
@@ -304,7 +311,7 @@ bool IterationLanes::isAccess(Operation *op) const {
 //===----------------------------------------------------------------------===//
 
 /// What a barrier combines the values of lanes by.
-void IterationLanes::checkCombination(Operation *barrier) {
+void LaneForms::checkCombination(Operation *barrier) {
   if (barrier->getNumRegions() == 0)
     return;
   for (Operation &op : barrier->getRegion(0).front().without_terminator()) {
@@ -318,7 +325,7 @@ void IterationLanes::checkCombination(Operation *barrier) {
 
 /// Lanes are at one place at a time, and so meet at each barrier if they go
 /// there together, and nothing that comes before it is put off.
-void IterationLanes::checkBarriers() {
+void LaneForms::checkBarriers() {
   Operation *ordered = nullptr;
   loop.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (op == loop || op->hasTrait<OpTrait::IsTerminator>())
@@ -357,7 +364,7 @@ void IterationLanes::checkBarriers() {
 /// Whether the iterations of a loop may change places, also with those of other
 /// lanes: they hand on nothing, and change each piece of state by atomic
 /// operations of one kind alone.
-bool IterationLanes::canCollapse(scf::ForOp inner) const {
+bool LaneForms::canCollapse(scf::ForOp inner) const {
   if (inner.getNumResults() > 0 || inner.getUnsignedCmp() ||
       !matchPattern(inner.getStep(), m_One()))
     return false;
@@ -385,7 +392,7 @@ bool IterationLanes::canCollapse(scf::ForOp inner) const {
   return !result.wasInterrupted();
 }
 
-void IterationLanes::findNests() {
+void LaneForms::findNests() {
   SmallVector<Uniformity::Root> roots(this->roots);
   loop.walk<WalkOrder::PreOrder>([&](scf::ForOp outer) {
     if (outer == loop || !canCollapse(outer))
@@ -430,7 +437,7 @@ static bool isUnordered(Operation *op) {
       op);
 }
 
-LaneForm IterationLanes::getForm(Operation *op) const {
+LaneForm LaneForms::getForm(Operation *op) const {
   if (isStructure(op))
     return LaneForm::Structure;
   if (isPrefetch(op))
@@ -464,7 +471,7 @@ LaneForm IterationLanes::getForm(Operation *op) const {
   return isUnordered(op) ? LaneForm::Serial : LaneForm::Ordered;
 }
 
-bool IterationLanes::isSharedLoop(Operation *op) const {
+bool LaneForms::isSharedLoop(Operation *op) const {
   if (auto inner = dyn_cast<scf::ForOp>(op))
     return !isVarying(inner.getLowerBound()) &&
            !isVarying(inner.getUpperBound()) && !isVarying(inner.getStep());
@@ -524,13 +531,13 @@ bool IterationLanes::addInstructions(Region &region, bool isOfStrip,
 // foreseen: without it, the next row's pixels are asked for in the meantime.
 bool IterationLanes::isCheap(Region &region) const {
   constexpr int64_t most = 12, mostOfStrip = 64;
-  bool isOfStrip = isOneVector(loop, laneCount);
+  bool isOfStrip = isOneVector(loop, getLaneCount());
   int64_t count = 0;
   return addInstructions(region, isOfStrip, count) &&
          count <= (isOfStrip ? mostOfStrip : most);
 }
 
-void IterationLanes::checkCarried() {
+void LaneForms::checkCarried() {
   loop.walk([&](Operation *op) {
     if (op == loop || !isStructure(op))
       return;
@@ -547,7 +554,7 @@ void IterationLanes::checkCarried() {
 }
 
 /// Whether all accesses to a row of lanes' elements are one after the other.
-bool IterationLanes::isRow(Operation *op) const {
+bool LaneForms::isRow(Operation *op) const {
   if (auto load = dyn_cast<memref::LoadOp>(op))
     return isPrivate(load.getMemRef()) ? !isVarying(load.getIndices()[0])
                                        : isLinear(load.getIndices()[0]);
@@ -569,7 +576,7 @@ bool IterationLanes::isRow(Operation *op) const {
   return store && isOfRow(store.getIndices());
 }
 
-bool IterationLanes::isPrivateRow(Operation *op) const {
+bool LaneForms::isPrivateRow(Operation *op) const {
   auto atomic = dyn_cast<AtomicOp>(op);
   return atomic && atomic.getCopy() && !atomic.getOld() &&
          loop.isDefinedOutsideOfLoop(atomic.getCopy()) && isRow(op) &&

@@ -35,7 +35,7 @@ SmallVector<Operation *> OrderedGroup::getOperations() const {
   }
 }
 
-const OrderedGroup *IterationLanes::findGroup(Operation *op) const {
+const OrderedGroup *LaneOrder::findGroup(Operation *op) const {
   for (const OrderedGroup &group : groups)
     if (group.contains(op))
       return &group;
@@ -43,7 +43,7 @@ const OrderedGroup *IterationLanes::findGroup(Operation *op) const {
 }
 
 /// Whether all that an operation does may be done before others.
-bool IterationLanes::isMovable(Operation *op) const {
+bool LaneOrder::isMovable(Operation *op) const {
   WalkResult result = op->walk([&](Operation *inner) {
     LaneForm form = getForm(inner);
     bool isFree = inner->hasTrait<OpTrait::IsTerminator>() ||
@@ -59,7 +59,7 @@ bool IterationLanes::isMovable(Operation *op) const {
 }
 
 llvm::SetVector<Operation *>
-IterationLanes::findMovable(ArrayRef<Operation *> ops) const {
+LaneOrder::findMovable(ArrayRef<Operation *> ops) const {
   llvm::SetVector<Operation *> movable;
   llvm::DenseSet<Operation *> inGroup(ops.begin(), ops.end());
   Block *block = ops.front()->getBlock();
@@ -80,7 +80,7 @@ IterationLanes::findMovable(ArrayRef<Operation *> ops) const {
 }
 
 llvm::SetVector<Operation *>
-IterationLanes::findTurns(const OrderedGroup &group) const {
+LaneOrder::findTurns(const OrderedGroup &group) const {
   SmallVector<Operation *> ops = group.getOperations();
   llvm::SetVector<Operation *> rest(ops.begin(), ops.end());
   for (Operation *op : findMovable(ops))
@@ -88,9 +88,8 @@ IterationLanes::findTurns(const OrderedGroup &group) const {
   return rest;
 }
 
-void IterationLanes::findGroups(Block &block,
-                                const llvm::DenseSet<Operation *> &ops,
-                                SmallVectorImpl<OrderedGroup> &found) const {
+void LaneOrder::findGroups(Block &block, const llvm::DenseSet<Operation *> &ops,
+                           SmallVectorImpl<OrderedGroup> &found) const {
   OrderedGroup group;
   SmallVector<Operation *> choices;
   for (Operation &op : block.without_terminator()) {
@@ -125,9 +124,9 @@ void IterationLanes::findGroups(Block &block,
     found.push_back(group);
 }
 
-void IterationLanes::findEmissionGroups(
-    Block &block, const llvm::DenseSet<Operation *> &ops,
-    SmallVectorImpl<OrderedGroup> &found) const {
+void LaneOrder::findEmissionGroups(Block &block,
+                                   const llvm::DenseSet<Operation *> &ops,
+                                   SmallVectorImpl<OrderedGroup> &found) const {
   OrderedGroup group;
   auto end = [&] {
     if (group)
@@ -152,7 +151,7 @@ void IterationLanes::findEmissionGroups(
 }
 
 /// Whether operations emit, and no loop of an iteration repeats them.
-bool IterationLanes::areEmissions(ArrayRef<Operation *> ops) const {
+bool LaneOrder::areEmissions(ArrayRef<Operation *> ops) const {
   return llvm::all_of(ops, [&](Operation *op) {
     bool isOnce = isa<AppendOp, AppendBinOp, NextOp>(op);
     for (Operation *at = op->getParentOp(); at != loop; at = at->getParentOp())
@@ -161,8 +160,8 @@ bool IterationLanes::areEmissions(ArrayRef<Operation *> ops) const {
   });
 }
 
-bool IterationLanes::canDelay(const OrderedGroup &group,
-                              const llvm::SetVector<Operation *> &rest) const {
+bool LaneOrder::canDelay(const OrderedGroup &group,
+                         const llvm::SetVector<Operation *> &rest) const {
   Block *block = group.first->getBlock();
   auto isInRest = [&](Operation *op) {
     op = block->findAncestorOpInBlock(*op);
@@ -210,7 +209,7 @@ struct Uses {
 
 } // namespace
 
-bool IterationLanes::canDelay(ArrayRef<OrderedGroup> groups) const {
+bool LaneOrder::canDelay(ArrayRef<OrderedGroup> groups) const {
   llvm::DenseSet<Operation *> later;
   for (const OrderedGroup &group : groups) {
     llvm::SetVector<Operation *> rest = findTurns(group);
@@ -258,7 +257,7 @@ static OrderedGroup join(ArrayRef<OrderedGroup> groups) {
 }
 
 SmallVector<OrderedGroup>
-IterationLanes::makeGroups(ArrayRef<Operation *> ops) const {
+LaneOrder::makeGroups(ArrayRef<Operation *> ops) const {
   SmallVector<OrderedGroup> found;
   llvm::DenseSet<Operation *> wanted(ops.begin(), ops.end());
   if (areEmissions(ops))
@@ -293,7 +292,7 @@ static bool overlap(const OrderedGroup &a, const OrderedGroup &b) {
          b.contains(a.last);
 }
 
-void IterationLanes::findOrdered() {
+void LaneOrder::findOrdered() {
   // What shares nothing whose order counts need not stay together.
   struct Cluster {
     SmallVector<Operation *> ops;
@@ -332,4 +331,14 @@ void IterationLanes::findOrdered() {
       }
   for (const Cluster &cluster : clusters)
     llvm::append_range(groups, cluster.groups);
+}
+
+void LaneOrder::findOrder() {
+  groups.clear();
+  emissions.clear();
+  emitted.clear();
+  if (getRefusal().at)
+    return;
+  findOrdered();
+  findEmissions();
 }

@@ -487,7 +487,7 @@ double IterationLanes::getFlatIterations(Operation *outer,
 }
 
 IterationLanes::Cost IterationLanes::getCost() const {
-  return getCost(getCycles(laneCount));
+  return getCost(getCycles(getLaneCount()));
 }
 
 IterationLanes::Cost IterationLanes::getCost(const Cycles &cycles) const {

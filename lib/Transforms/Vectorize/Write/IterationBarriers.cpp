@@ -61,26 +61,6 @@ SmallVector<Value> IterationWriter::combine(Block &body, ValueRange left,
   return llvm::map_to_vector(body.getTerminator()->getOperands(), lookUp);
 }
 
-SmallVector<Value> IterationWriter::shuffle(ValueRange values,
-                                            ArrayRef<int64_t> from) {
-  return llvm::map_to_vector(values, [&](Value value) -> Value {
-    return vector::ShuffleOp::create(builder, loc, value, value, from);
-  });
-}
-
-Value IterationWriter::createMask(llvm::function_ref<bool(int64_t)> holds) {
-  SmallVector<bool> lanes;
-  for (int64_t lane = 0; lane < laneCount; ++lane)
-    lanes.push_back(holds(lane));
-  return arith::ConstantOp::create(
-      builder, loc,
-      DenseElementsAttr::get(getVectorType(builder.getI1Type()), lanes));
-}
-
-SmallVector<Value> IterationWriter::getAll(ValueRange values) {
-  return llvm::map_to_vector(values, [&](Value value) { return get(value); });
-}
-
 SmallVector<Value> IterationWriter::combineLanes(ReduceOp reduce) {
   int64_t count = *getConstantIntValue(loop.getUpperBound());
   SmallVector<Value> values = getAll(reduce.getValues());

@@ -22,17 +22,6 @@ using namespace piko;
 /// errors are less than 2^-13, and it is at least 2^-11 away from an integer.
 static constexpr int64_t mostTurns = 1024;
 
-Value IterationWriter::number(int64_t value) {
-  return arith::ConstantOp::create(
-      builder, loc,
-      DenseElementsAttr::get(getVectorType(builder.getI32Type()),
-                             builder.getI32IntegerAttr(value)));
-}
-
-Value IterationWriter::permute(Value value, Value from) {
-  return PermuteOp::create(builder, loc, value, from);
-}
-
 /// Which lane's turns a place is among, by where the lanes' turns end: how many
 /// of them end before it. With few lanes each is asked, and with more by binary
 /// search.

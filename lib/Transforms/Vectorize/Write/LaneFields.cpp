@@ -3,7 +3,7 @@
 // Reads of several fields of an element whose place differs between lanes, as
 // of the triangle that a pixel shows. Neighbours mostly read the same one.
 
-#include "Vectorize/Write/IterationWriter.h"
+#include "Vectorize/Write/LaneMemory.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -19,7 +19,7 @@ using namespace piko;
 /// often do not.
 static bool mayAgree(scf::ForOp loop) { return !loop->hasAttr(marks::mapping); }
 
-SmallVector<LoadOp> IterationWriter::findFields(Operation *first) const {
+SmallVector<LoadOp> LaneMemory::findFields(Operation *first) const {
   constexpr size_t least = 3;
   auto isPart = [&](LoadOp load) {
     return load && lanes.getForm(load) == LaneForm::Access &&
@@ -44,7 +44,7 @@ SmallVector<LoadOp> IterationWriter::findFields(Operation *first) const {
 }
 
 std::pair<SmallVector<Value>, Value>
-IterationWriter::compareWithFirst(ValueRange places) {
+LaneMemory::compareWithFirst(ValueRange places) {
   // No lane is active here only where nothing that is read matters.
   Value bits = getBits(active);
   Value last = arith::ConstantOp::create(
@@ -71,7 +71,7 @@ IterationWriter::compareWithFirst(ValueRange places) {
 
 /// Where all active lanes read one element, scalar loads read it; elsewhere,
 /// gathers do.
-void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
+void LaneMemory::writeFields(ArrayRef<LoadOp> loads) {
   auto [first, differ] =
       compareWithFirst(getPlaces(LoadOp(loads.front()).getIndices()));
   ArrayRef<Value> firsts = first; // which lambdas can capture
@@ -105,7 +105,7 @@ void IterationWriter::writeFields(ArrayRef<LoadOp> loads) {
 }
 
 /// An element for each lane, and of a row each line of the cache.
-void IterationWriter::writePrefetch(PrefetchOp prefetch) {
+void LaneMemory::writePrefetch(PrefetchOp prefetch) {
   constexpr int64_t lineSize = 64;
   SmallVector<Value> places = getPlaces(prefetch.getIndices());
   bool isRow = isRowOf(prefetch.getIndices());

@@ -3,7 +3,7 @@
 // What runs for one lane after the other: in its place, or after all that
 // vectors do. Values of lanes go through memory, a slot for each.
 
-#include "Vectorize/Write/IterationWriter.h"
+#include "Vectorize/Write/LaneTurns.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -14,71 +14,6 @@
 
 using namespace mlir;
 using namespace piko;
-
-//===----------------------------------------------------------------------===//
-// Slots
-//===----------------------------------------------------------------------===//
-
-/// As what memory holds a value of lanes.
-static Type getSlotType(Type type) {
-  if (type.isInteger(1))
-    return IntegerType::get(type.getContext(), 8);
-  return isa<PrimType>(type) ? IndexType::get(type.getContext()) : type;
-}
-
-Value IterationWriter::createSlot(Type type) {
-  OpBuilder arrays(outermost);
-  constexpr int64_t lineSize = 64;
-  return memref::AllocaOp::create(
-      arrays, loc, MemRefType::get({laneCount}, getSlotType(type)),
-      arrays.getI64IntegerAttr(lineSize));
-}
-
-/// A number, or numbers, as a slot holds them.
-static Value toSlot(OpBuilder &builder, Location loc, Value value, Type kept) {
-  Type type = value.getType();
-  if (isa<PrimType>(type))
-    return ToAddressOp::create(builder, loc, value);
-  if (getElementTypeOrSelf(type) == kept)
-    return value;
-  auto vector = dyn_cast<VectorType>(type);
-  return arith::ExtUIOp::create(
-      builder, loc, vector ? Type(vector.clone(kept)) : kept, value);
-}
-
-static Value fromSlot(OpBuilder &builder, Location loc, Value value,
-                      Type type) {
-  if (auto prim = dyn_cast<PrimType>(type))
-    return FromAddressOp::create(builder, loc, prim, value);
-  if (value.getType() == type)
-    return value;
-  Value zero = arith::ConstantOp::create(builder, loc,
-                                         builder.getZeroAttr(value.getType()));
-  return arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne, value,
-                               zero);
-}
-
-static Type getKept(Value slot) {
-  return cast<MemRefType>(slot.getType()).getElementType();
-}
-
-void IterationWriter::storeSlot(Value value, Value slot, Value at) {
-  value = toSlot(builder, loc, value, getKept(slot));
-  if (isa<VectorType>(value.getType()))
-    vector::StoreOp::create(builder, loc, value, slot, at);
-  else
-    memref::StoreOp::create(builder, loc, value, slot, at);
-}
-
-Value IterationWriter::loadSlot(Value slot, Value at, Type type) {
-  Value value =
-      isa<VectorType>(type)
-          ? vector::LoadOp::create(builder, loc, getVectorType(getKept(slot)),
-                                   slot, at)
-                .getResult()
-          : memref::LoadOp::create(builder, loc, slot, at).getResult();
-  return fromSlot(builder, loc, value, type);
-}
 
 //===----------------------------------------------------------------------===//
 // A turn
@@ -143,7 +78,7 @@ private:
 } // namespace
 
 /// Arrays of an iteration have a column for each lane.
-void IterationWriter::useColumns(Operation *copy, Value lane) {
+void LaneTurns::useColumns(Operation *copy, Value lane) {
   copy->walk([&](Operation *op) {
     auto load = dyn_cast<memref::LoadOp>(op);
     auto write = dyn_cast<memref::StoreOp>(op);
@@ -162,8 +97,8 @@ void IterationWriter::useColumns(Operation *copy, Value lane) {
   });
 }
 
-SmallVector<Operation *> IterationWriter::findRest(Operation *first,
-                                                   Operation *last) const {
+SmallVector<Operation *> LaneTurns::findRest(Operation *first,
+                                             Operation *last) const {
   SmallVector<Operation *> rest;
   for (Operation *op : OrderedGroup{first, last}.getOperations()) {
     bool isDone = llvm::any_of(op->getResults(), [&](Value result) {
@@ -189,8 +124,8 @@ static SmallVector<Value> findOutputs(ArrayRef<Operation *> ops) {
   return outputs;
 }
 
-IterationWriter::Turn
-IterationWriter::prepareTurn(Operation *first, Operation *last, bool isLate) {
+LaneTurns::Turn LaneTurns::prepareTurn(Operation *first, Operation *last,
+                                       bool isLate) {
   Turn turn;
   turn.ops = findRest(first, last);
   for (Operation *op : turn.ops)
@@ -214,7 +149,7 @@ IterationWriter::prepareTurn(Operation *first, Operation *last, bool isLate) {
   return turn;
 }
 
-IRMapping IterationWriter::writeTurn(const Turn &turn, Value lane) {
+IRMapping LaneTurns::writeTurn(const Turn &turn, Value lane) {
   IRMapping mapping(scalars);
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (auto [value, slot] : turn.varying)
@@ -239,23 +174,8 @@ IRMapping IterationWriter::writeTurn(const Turn &turn, Value lane) {
   return mapping;
 }
 
-Type IterationWriter::getWord() {
-  constexpr int64_t byteSize = 8;
-  return builder.getIntegerType(std::max(laneCount, byteSize));
-}
-
-Value IterationWriter::getBits(Value mask) {
-  Type bits = builder.getIntegerType(laneCount), word = getWord();
-  Value packed = vector::ExtractOp::create(
-      builder, loc,
-      vector::BitCastOp::create(builder, loc, VectorType::get({1}, bits), mask),
-      ArrayRef<int64_t>{0});
-  return bits == word ? packed
-                      : arith::ExtUIOp::create(builder, loc, word, packed);
-}
-
-void IterationWriter::writeTurns(Value bits,
-                                 llvm::function_ref<void(Value lane)> write) {
+void LaneTurns::writeTurns(Value bits,
+                           llvm::function_ref<void(Value lane)> write) {
   // One bit for each lane; the lowest one is the next.
   Type word = bits.getType();
   Value none = zeros(word), one = arith::ConstantOp::create(
@@ -282,7 +202,7 @@ void IterationWriter::writeTurns(Value bits,
 // In its place
 //===----------------------------------------------------------------------===//
 
-void IterationWriter::writeSerial(Operation *first, Operation *last) {
+void LaneTurns::writeSerial(Operation *first, Operation *last) {
   Turn turn = prepareTurn(first, last, /*isLate=*/false);
   SmallVector<Value> outputs = findOutputs(turn.ops);
   llvm::DenseMap<Value, Value> slots;
@@ -303,27 +223,11 @@ void IterationWriter::writeSerial(Operation *first, Operation *last) {
   }
 }
 
-void IterationWriter::writeOrdered(const OrderedGroup &group) {
-  for (Operation *op : lanes.findMovable(group.getOperations()))
-    writeOperation(op);
-  if (!group.late)
-    return writeSerial(group.first, group.last);
-  Turn turn = prepareTurn(group.first, group.last, /*isLate=*/true);
-  turn.mask = masks.lookup(group.first);
-  Value start = arith::ConstantIndexOp::create(builder, loc, 0);
-  Value bits = getBits(active);
-  if (std::optional<Value> counted = writeIsCounted(turn))
-    bits = arith::SelectOp::create(builder, loc, *counted, bits,
-                                   zeros(bits.getType()));
-  storeSlot(bits, turn.mask, start);
-  late.push_back(std::move(turn));
-}
-
 //===----------------------------------------------------------------------===//
 // After all
 //===----------------------------------------------------------------------===//
 
-std::optional<Value> IterationWriter::writeIsCounted(const Turn &turn) {
+std::optional<Value> LaneTurns::writeIsCounted(const Turn &turn) {
   Value counted;
   for (Operation *op : turn.ops) {
     auto next = dyn_cast<NextOp>(op);
@@ -335,7 +239,19 @@ std::optional<Value> IterationWriter::writeIsCounted(const Turn &turn) {
   return counted;
 }
 
-void IterationWriter::createMasks() {
+void LaneTurns::delay(const OrderedGroup &group) {
+  Turn turn = prepareTurn(group.first, group.last, /*isLate=*/true);
+  turn.mask = masks.lookup(group.first);
+  Value start = arith::ConstantIndexOp::create(builder, loc, 0);
+  Value bits = getBits(active);
+  if (std::optional<Value> counted = writeIsCounted(turn))
+    bits = arith::SelectOp::create(builder, loc, *counted, bits,
+                                   zeros(bits.getType()));
+  storeSlot(bits, turn.mask, start);
+  late.push_back(std::move(turn));
+}
+
+void LaneTurns::createMasks() {
   Type word = getWord();
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   for (const OrderedGroup &group : lanes.getGroups()) {
@@ -346,7 +262,7 @@ void IterationWriter::createMasks() {
   }
 }
 
-void IterationWriter::writeLateTurns(ArrayRef<Turn> late) {
+void LaneTurns::writeLateTurns(ArrayRef<Turn> late) {
   if (late.empty())
     return;
   Type word = getWord();

@@ -12,7 +12,7 @@
 // fields vectors have are transposed before lanes take turns, and copied
 // (piko.cpu.store_records).
 
-#include "Vectorize/Write/IterationWriter.h"
+#include "Vectorize/Write/LaneTurns.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -57,14 +57,14 @@ static bool hasVectors(Operation *op,
          });
 }
 
-bool IterationLanes::isStoredByVectors(AppendOp append) const {
+bool LaneOrder::isStoredByVectors(AppendOp append) const {
   constexpr size_t least = 4;
   const OrderedGroup *group = findGroup(append);
   return group && !isEmission(append) && append.getValues().size() >= least &&
          hasVectors(append, findTurns(*group)) && hasWords(append);
 }
 
-StringRef IterationLanes::explainTurns(Operation *emission) const {
+StringRef LaneOrder::explainTurns(Operation *emission) const {
   auto isRepeated = [&](Operation *op) {
     for (Operation *at = op->getParentOp(); at != loop; at = at->getParentOp())
       if (isa<scf::ForOp, scf::WhileOp>(at))
@@ -95,7 +95,7 @@ StringRef IterationLanes::explainTurns(Operation *emission) const {
 
 /// Adds a record, or the place of the last one; whether there is a way to emit
 /// it.
-bool IterationLanes::addEmission(Operation *op, PortEmissions &port) const {
+bool LaneOrder::addEmission(Operation *op, PortEmissions &port) const {
   const OrderedGroup *group = findGroup(op);
   if (!group || !group->late || !hasVectors(op, findTurns(*group)))
     return false;
@@ -114,7 +114,7 @@ bool IterationLanes::addEmission(Operation *op, PortEmissions &port) const {
          bool(first.getTile()) == bool(place.getTile());
 }
 
-void IterationLanes::findEmissions() {
+void LaneOrder::findEmissions() {
   llvm::MapVector<std::pair<Value, int64_t>, PortEmissions> ports;
   llvm::DenseSet<std::pair<Value, int64_t>> others;
   llvm::DenseSet<Value> writers; // that more happens to than emission
@@ -154,7 +154,7 @@ void IterationLanes::findEmissions() {
 // How
 //===----------------------------------------------------------------------===//
 
-Value IterationWriter::getTurnValue(const Turn &turn, Value value) {
+Value LaneTurns::getTurnValue(const Turn &turn, Value value) {
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   if (Value slot = turn.varying.lookup(value))
     return loadSlot(slot, start, getVectorType(value.getType()));
@@ -166,7 +166,7 @@ Value IterationWriter::getTurnValue(const Turn &turn, Value value) {
   return splat(getUniform(value));
 }
 
-Value IterationWriter::loadMask(const Turn &turn) {
+Value LaneTurns::loadMask(const Turn &turn) {
   Value start = arith::ConstantIndexOp::create(builder, loc, 0);
   Value bits = loadSlot(turn.mask, start, getWord());
   Type lanesBits = builder.getIntegerType(laneCount);
@@ -178,14 +178,13 @@ Value IterationWriter::loadMask(const Turn &turn) {
                                   bits));
 }
 
-const IterationWriter::Turn &
-IterationWriter::findTurn(LaneRecord record) const {
+const LaneTurns::Turn &LaneTurns::findTurn(LaneRecord record) const {
   return *llvm::find_if(late, [&](const Turn &turn) {
     return llvm::is_contained(turn.ops, record.append.getOperation());
   });
 }
 
-void IterationWriter::writeEmissions(const PortEmissions &port) {
+void LaneTurns::writeEmissions(const PortEmissions &port) {
   SmallVector<Value> values, masks, bins, tiles;
   for (LaneRecord record : port.records) {
     const Turn &turn = findTurn(record);
@@ -207,7 +206,7 @@ void IterationWriter::writeEmissions(const PortEmissions &port) {
                        bins, tiles);
 }
 
-Value IterationWriter::writeRecords(AppendOp append) {
+Value LaneTurns::writeRecords(AppendOp append) {
   FlatSymbolRefAttr name = append.getPrim().getType().getRecord();
   constexpr int64_t lineSize = 64, pieceSize = 16;
   int64_t size =
@@ -227,7 +226,7 @@ Value IterationWriter::writeRecords(AppendOp append) {
 /// Whether so few records are emitted that turns take no longer: vectors store
 /// those of all lanes. Of records of up to 16 bytes that is a store for each
 /// lane; of larger ones turns for three eighths of the lanes took as long.
-Value IterationWriter::writeAreFew() {
+Value LaneTurns::writeAreFew() {
   Value start = arith::ConstantIndexOp::create(builder, loc, 0), count;
   int64_t few = 0;
   for (const PortEmissions &port : lanes.getEmissions())
@@ -250,7 +249,7 @@ Value IterationWriter::writeAreFew() {
 }
 
 /// What is left for turns where vectors emit, and positions are not counted.
-SmallVector<IterationWriter::Turn> IterationWriter::findOtherTurns() const {
+SmallVector<LaneTurns::Turn> LaneTurns::findOtherTurns() const {
   SmallVector<Turn> others;
   for (const Turn &turn : late) {
     Turn other = turn;
@@ -263,7 +262,7 @@ SmallVector<IterationWriter::Turn> IterationWriter::findOtherTurns() const {
   return others;
 }
 
-void IterationWriter::writeLate() {
+void LaneTurns::writeLate() {
   if (late.empty())
     return;
   llvm::SetVector<Value> writers;

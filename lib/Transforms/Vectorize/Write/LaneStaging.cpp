@@ -8,7 +8,7 @@
 //           and a scalar loop goes through it when it is full. So misses of the
 //           cache overlap, and no branch depends on the lanes of one vector.
 
-#include "Vectorize/Write/IterationWriter.h"
+#include "Vectorize/Write/LaneMemory.h"
 
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
@@ -19,7 +19,7 @@ using namespace piko;
 /// How many changes a list holds before it is gone through.
 static constexpr int64_t mostStaged = 256;
 
-void IterationWriter::writePrivateRow(AtomicOp atomic) {
+void LaneMemory::writePrivateRow(AtomicOp atomic) {
   SmallVector<Value> elements;
   for (Value element : atomic.getElements())
     elements.push_back(getUniform(element));
@@ -29,7 +29,7 @@ void IterationWriter::writePrivateRow(AtomicOp atomic) {
                       getUniform(atomic.getCopy()));
 }
 
-bool IterationWriter::canStage(Operation *op) {
+bool LaneMemory::canStage(Operation *op) {
   // Fewer lanes have no instruction that compresses.
   constexpr int64_t least = 16;
   auto atomic = dyn_cast<AtomicOp>(op);
@@ -41,7 +41,7 @@ bool IterationWriter::canStage(Operation *op) {
          });
 }
 
-IterationWriter::Staged &IterationWriter::getStaged(AtomicOp atomic) {
+LaneMemory::Staged &LaneMemory::getStaged(AtomicOp atomic) {
   Staged &list = staged[atomic];
   if (list.count)
     return list;
@@ -62,8 +62,7 @@ IterationWriter::Staged &IterationWriter::getStaged(AtomicOp atomic) {
 }
 
 /// Makes the changes that wait, in any order.
-void IterationWriter::writeFlush(AtomicOp atomic, const Staged &list,
-                                 Value count) {
+void LaneMemory::writeFlush(AtomicOp atomic, const Staged &list, Value count) {
   Value zero = arith::ConstantIndexOp::create(builder, loc, 0);
   Value one = arith::ConstantIndexOp::create(builder, loc, 1);
   auto changes = scf::ForOp::create(builder, loc, zero, count, one);
@@ -80,7 +79,7 @@ void IterationWriter::writeFlush(AtomicOp atomic, const Staged &list,
   memref::StoreOp::create(builder, loc, zero, list.count, zero);
 }
 
-void IterationWriter::writeStaged(AtomicOp atomic) {
+void LaneMemory::writeStaged(AtomicOp atomic) {
   Staged &list = getStaged(atomic);
   Value zero = arith::ConstantIndexOp::create(builder, loc, 0);
   Value count = memref::LoadOp::create(builder, loc, list.count, zero);
@@ -101,7 +100,7 @@ void IterationWriter::writeStaged(AtomicOp atomic) {
   writeFlush(atomic, list, count);
 }
 
-void IterationWriter::writeLastFlushes() {
+void LaneMemory::writeLastFlushes() {
   OpBuilder::InsertionGuard guard(builder);
   builder.setInsertionPointAfter(outermost);
   Value zero = arith::ConstantIndexOp::create(builder, loc, 0);

@@ -4,7 +4,7 @@
 // around in it, most vectors are in its middle, and read one element after the
 // other.
 
-#include "Vectorize/Write/IterationWriter.h"
+#include "Vectorize/Write/LaneMemory.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -15,7 +15,7 @@ using namespace piko;
 
 /// Whether a value grows by one from lane to lane but where it is limited: by
 /// a clamp, a remainder or a choice.
-bool IterationLanes::isLimited(Value value) const {
+bool LaneForms::isLimited(Value value) const {
   if (!isVarying(value) || isLinear(value))
     return isVarying(value);
   Operation *op = value.getDefiningOp();
@@ -35,7 +35,7 @@ bool IterationLanes::isLimited(Value value) const {
   return false;
 }
 
-Value IterationLanes::findLimited(Operation *op) const {
+Value LaneForms::findLimited(Operation *op) const {
   auto load = dyn_cast<LoadOp>(op);
   if (!load || load.getIndices().empty() || isRow(op) ||
       llvm::any_of(load.getIndices().drop_front(),
@@ -54,7 +54,7 @@ Value IterationLanes::findLimited(Operation *op) const {
 
 /// Sums wrap around alike in the test and in the index: no lane that is active
 /// has an index out of bounds.
-void IterationWriter::writeLimited(LoadOp load, Value limited) {
+void LaneMemory::writeLimited(LoadOp load, Value limited) {
   Value number = get(limited);
   auto type = cast<VectorType>(number.getType());
   Value steps = vector::StepOp::create(builder, loc,
