@@ -32,11 +32,13 @@ std::optional<UnitOrder> piko::getUnitOrder(KernelOp kernel) {
     return UnitOrder::Fixed;
   auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
   ScheduleOp schedule = stage.getSchedule();
+  if (!schedule)
+    return UnitOrder::Dispatched;
   // One that depends on the bin has units of all kinds.
-  if (!schedule || !schedule.getBody().empty())
+  if (!schedule.getResolved())
     return UnitOrder::Taken;
   ScheduleKind kind = schedule.getKind();
   return kind == ScheduleKind::DirectMap || kind == ScheduleKind::Serialize
              ? UnitOrder::Fixed
-             : UnitOrder::Taken;
+             : UnitOrder::Dispatched;
 }

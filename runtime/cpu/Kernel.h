@@ -193,24 +193,16 @@ struct InputMirrors {
 /// How far the units of each owner have been given to threads.
 class UnitCursors {
 public:
-  /// For units that belong to so many homes, or to nobody (Units.cpp).
-  void reset(const std::vector<pikoir_unit> &units, int64_t homes);
-  int64_t homes() const { return homes_; }
-  /// Whether no unit has an owner.
-  bool areNobodys() const { return nobodys_; }
-  /// The next unit of an owner, or -1 at the end.
-  int64_t take(const pikoir_unit *units, int64_t owner);
+  /// Begins for units that belong to so many homes, or to nobody (Units.cpp).
+  void reset(const std::vector<pikoir_unit> &units, int64_t homes,
+             pikoir_input &input);
 
 private:
-  struct alignas(64) Cursor { // on a line of its own
-    std::atomic<int64_t> next = 0;
-    int64_t end = 0; ///< After the last unit.
+  struct alignas(64) Line {
+    pikoir_cursor cursor;
   };
-  Cursor &of(int64_t owner) { return cursors_[owner + 2]; }
-
-  std::unique_ptr<Cursor[]> cursors_;
-  int64_t homes_ = 0, room_ = 0;
-  bool nobodys_ = true;
+  std::unique_ptr<Line[]> lines_;
+  int64_t room_ = 0;
 };
 
 class Serial;         // Serial.h

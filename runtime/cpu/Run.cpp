@@ -55,7 +55,8 @@ static void publish(pikort_pipeline &p, Kernel &kernel) {
                   kernel.calls.data(),
                   kernel.calls.size(),
                   /*clears=*/0,
-                  /*cursors=*/nullptr};
+                  /*cursors=*/nullptr,
+                  /*homes=*/0};
   shareUnits(p, kernel);
 }
 
@@ -179,8 +180,7 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
     kernel.open = true;
     if (kernel.tuner && !kernel.runsSerially)
       kernel.tuner->beginLaunch(kernel.units);
-    kernel.cursors.reset(kernel.units, p.threads);
-    kernel.input.cursors = &kernel.cursors;
+    kernel.cursors.reset(kernel.units, p.threads, kernel.input);
     int64_t threads = std::min(kernel.mostThreads, p.threads);
     cpuOf(p).activeThreads = kernel.runsSerially
                                  ? 1

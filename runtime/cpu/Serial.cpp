@@ -136,7 +136,8 @@ void Serial::begin(const Items &input) {
                    stage_.takesList() ? calls_.data() : nullptr,
                    static_cast<int64_t>(calls_.size()),
                    /*clears=*/0,
-                   /*cursors=*/nullptr};
+                   /*cursors=*/nullptr,
+                   /*homes=*/0};
   shareInput(p_, kernel_, input);
 }
 

@@ -58,10 +58,11 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
     **Requires** loops over units (`piko-form-units`).
 
     **Does**: turns the `scf.forall` of each kernel into an `omp.parallel` with the
-    host's thread count. Each thread asks the runtime for one unit after the other. A
-    loop whose `piko.units` is `serial` becomes a sequential `scf.for`. Private arrays
-    move to the start of the thread's region, so that they take stack space once and
-    not for each primitive.
+    host's thread count. By its `piko.units`, each thread takes the next unit
+    (`shared`), first those of its own (`mapped`), or asks the runtime for each
+    (`asked`); a `serial` loop becomes a sequential `scf.for`. Private arrays move to
+    the start of the thread's region, so that they take stack space once and not for
+    each primitive.
 
     Before:
     ```
@@ -71,14 +72,16 @@ def ConvertPikoToOpenMP : Pass<"convert-piko-to-openmp", "::piko::PipelineOp"> {
     ```
     %threads = piko.cpu.threads
     omp.parallel num_threads(%threads : i32) {
-      scf.while : () -> index {
-        %next = piko.cpu.next_unit %bins : !piko.bins<@Fragment>
-        %any = arith.cmpi ult, %next, %units : index
-        scf.condition(%any) %next : index
-      } do {
-      ^bb0(%u: index):
-        ...
-        scf.yield
+      scf.if %some {
+        scf.while : () -> index {
+          %next = piko.cpu.take_unit %bins : !piko.bins<@Fragment>
+          %any = arith.cmpi ult, %next, %units : index
+          scf.condition(%any) %next : index
+        } do {
+        ^bb0(%u: index):
+          ...
+          scf.yield
+        }
       }
     }
     ```

@@ -19,13 +19,16 @@ mlir::FlatSymbolRefAttr getStageName(mlir::Operation *work);
 
 /// How the blocks of a grid come to the units that they run.
 enum class UnitOrder {
-  Fixed, ///< Block b of n runs the units b, b + n, ...: `direct_map`, and
-         ///< `serialize`, of which there is one.
-  Taken  ///< A block takes the next ones when it has ended its own.
+  Fixed,      ///< Block b of n runs the units b, b + n, ...: `direct_map`, and
+              ///< `serialize`, of which there is one.
+  Dispatched, ///< A block has one, which the hardware begins where another one
+              ///< has ended; where there are more units than blocks of a grid,
+              ///< it takes the next ones.
+  Taken       ///< A block takes the next ones when it has ended its own.
 };
 
-/// Of a kernel at the machine level, by its stage's schedule; nothing for one
-/// that has no units.
+/// Of a kernel at the machine level, by what is resolved of its stage's
+/// schedule; nothing for one that has no units.
 std::optional<UnitOrder> getUnitOrder(KernelOp kernel);
 
 } // namespace piko

@@ -221,9 +221,10 @@ def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
     all end with the same directives, these become the schedule's own, and the body is
     erased. Nothing then runs for each bin, and `piko-fuse-stages` sees the kind. A
     schedule without a body that is `direct_map`, `serialize` or `all` becomes
-    `resolved`. On a CPU, `serialize` then makes a sequential loop of the units of a
-    kernel (`piko-form-units`). Of any other kernel, threads ask the runtime for each
-    unit, `resolved` or not.
+    `resolved`: who runs a bin is known when it is joined, and kernels ask no scheduler.
+    Of `direct_map`, a thread of a CPU takes the units of its own (`piko.units =
+    #piko<units mapped>`), and block `b` of `n` on a GPU has those of number `b`, `b +
+    n`, ... Of `serialize`, one loop runs all; of `all`, any thread takes the next one.
 
     **Guarantees** that each bin has the directives that it had.
 
@@ -419,9 +420,10 @@ def EliminateSchedules
 
     **Does**: erases schedules that say `load_balance` and no more, which is what a
     stage without a schedule has. One that also waits, takes batches, runs for every
-    bin, gives up an order or says its lanes becomes `resolved`. The kernel's code
-    does not change: on a CPU threads still ask the runtime for each unit, and on a
-    GPU blocks take the next ones from a counter of the launch.
+    bin, gives up an order or says its lanes becomes `resolved`. Kernels then ask no
+    scheduler. On a CPU, threads count units by an atomic addition (`piko.units =
+    #piko<units shared>`). On a GPU, a block has one unit, and the hardware begins it,
+    as long as a grid has enough blocks.
 
     **Guarantees** that the stage's bins run as before.
 

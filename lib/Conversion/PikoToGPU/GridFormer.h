@@ -60,10 +60,11 @@ void loadForUses(mlir::Value number, mlir::Operation *loop, mlir::Value memory,
                  bool again = true);
 
 /// Lets the block take the units that a loop goes over from a counter of the
-/// log, whoever runs them. `inBlock`: the number of the one that it runs is
-/// kept in shared memory.
+/// log, whoever runs them; or, if it `dispatches`, has one that the hardware
+/// has begun, where a grid has as many blocks. `inBlock`: the number of the one
+/// that it runs is kept in shared memory.
 void takeUnits(mlir::scf::ForOp units, mlir::gpu::LaunchOp launch,
-               mlir::Value log, bool inBlock);
+               mlir::Value log, bool dispatches, bool inBlock);
 /// Lets it do so from the counter of a kernel's second launch.
 void takeUnitsForRest(mlir::gpu::LaunchOp launch);
 

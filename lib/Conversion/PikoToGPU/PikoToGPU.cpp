@@ -188,8 +188,9 @@ void GridBuilder::finishGrid(GridMemory &memory, bool countsInBlock) {
   scf::ForOp units = repeatForUnits(memory.launch, bins, opened);
   if (countsInBlock)
     countBucketsInBlock(units, memory.launch);
-  if (order == UnitOrder::Taken)
-    takeUnits(units, memory.launch, memory.log, countsInBlock);
+  if (order != UnitOrder::Fixed)
+    takeUnits(units, memory.launch, memory.log,
+              /*dispatches=*/order == UnitOrder::Dispatched, countsInBlock);
   else if (countsInBlock)
     countUnitsInBlock(units, memory.launch);
 }

@@ -3,9 +3,9 @@
 // Blocks that take the next unit of work when they have ended one, so that
 // none waits for a block whose units take longer.
 //   1. Where the block begins, the first thread finds out how many units are
-//      taken at a time. A grid of as many blocks as there are units takes none:
-//      block b has unit b, and it is the hardware that begins one where another
-//      has ended.
+//      taken at a time. If the schedule is eliminated, a grid of as many blocks
+//      as there are units takes none: block b has unit b, and it is the
+//      hardware that begins one where another has ended.
 //   2. Before each unit it finds the unit's number: the next one of those
 //      that the block has, or else the launch's counter is moved on by an
 //      atomic addition.
@@ -39,8 +39,8 @@ namespace {
 
 class UnitTaking {
 public:
-  UnitTaking(scf::ForOp units, gpu::LaunchOp launch, Value log)
-      : units(units), launch(launch), log(log),
+  UnitTaking(scf::ForOp units, gpu::LaunchOp launch, Value log, bool dispatches)
+      : units(units), launch(launch), log(log), dispatches(dispatches),
         count(units.getUpperBound().getDefiningOp<UnitCountOp>()) {}
 
   void run(bool inBlock);
@@ -62,6 +62,7 @@ private:
   scf::ForOp units;
   gpu::LaunchOp launch;
   Value log;
+  bool dispatches; ///< The hardware may, where there are few units.
   UnitCountOp count;
   /// In shared memory: the unit that it runs, the end of those that it has
   /// taken, and how many it takes at a time, 0 where it takes none.
@@ -90,7 +91,8 @@ static Value choose(Emitter &b, Value test, Value first,
 void UnitTaking::begin(Emitter &b) {
   Value block = launch.getBlockIds().x, blocks = launch.getGridSize().x;
   Value number = toNumber(b, block), zero = b.number(0);
-  Value isOwn = b.is(count, Predicate::ule, blocks);
+  Value isOwn =
+      dispatches ? b.is(count, Predicate::ule, blocks) : b.truth(false);
   constexpr int64_t bits = 32 + llvm::ConstantLog2<takesOfBlock>();
   Value zeros = math::CountLeadingZerosOp::create(b, toNumber(b, blocks));
   Value shift = toUnit(b, b.sub(b.number(bits), zeros));
@@ -161,6 +163,6 @@ void piko::takeUnitsForRest(gpu::LaunchOp launch) {
 }
 
 void piko::takeUnits(scf::ForOp units, gpu::LaunchOp launch, Value log,
-                     bool inBlock) {
-  UnitTaking(units, launch, log).run(inBlock);
+                     bool dispatches, bool inBlock) {
+  UnitTaking(units, launch, log, dispatches).run(inBlock);
 }

@@ -20,7 +20,10 @@ constexpr RuntimeMember count = PIKO_RUNTIME_MEMBER(pikoir_input, count),
                             PIKO_RUNTIME_MEMBER(pikoir_input, unit_count),
                         tiles = PIKO_RUNTIME_MEMBER(pikoir_input, tiles),
                         calls = PIKO_RUNTIME_MEMBER(pikoir_input, calls),
-                        clears = PIKO_RUNTIME_MEMBER(pikoir_input, clears);
+                        clears = PIKO_RUNTIME_MEMBER(pikoir_input, clears),
+                        cursors = PIKO_RUNTIME_MEMBER(pikoir_input, cursors);
+constexpr RuntimeMember taken = PIKO_RUNTIME_MEMBER(pikoir_cursor, next),
+                        lastTaken = PIKO_RUNTIME_MEMBER(pikoir_cursor, end);
 constexpr RuntimeMember bucketBegin =
                             PIKO_RUNTIME_MEMBER(pikoir_unit, bucket_begin),
                         bucketEnd =
@@ -124,6 +127,48 @@ struct UnitBucketsLowering : Lowering<UnitBucketsOp> {
     Value last = load(rewriter, loc, unit, layout::bucketEnd);
     rewriter.replaceOp(
         op, {toIndex(rewriter, loc, first), toIndex(rewriter, loc, last)});
+    return success();
+  }
+};
+
+struct ThreadLowering : Lowering<ThreadOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ThreadOp op, OpAdaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value number =
+        context.call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_thread), {})
+            .getResult();
+    rewriter.replaceOp(op, toIndex(rewriter, loc, number));
+    return success();
+  }
+};
+
+struct TakeUnitLowering : Lowering<TakeUnitOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(TakeUnitOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Location loc = op.getLoc();
+    Value cursor = context.member(rewriter, adaptor.getBins(), layout::cursors);
+    if (Value thread = adaptor.getThread())
+      cursor = createOffset(
+          rewriter, loc,
+          entry(rewriter, loc, cursor, thread, sizeof(pikoir_cursor)),
+          PIKOIR_CURSOR_HOMES * sizeof(pikoir_cursor));
+    Value unit = LLVM::AtomicRMWOp::create(
+        rewriter, loc, LLVM::AtomicBinOp::add,
+        createOffset(rewriter, loc, cursor, layout::taken.offset),
+        createI64(rewriter, loc, 1), LLVM::AtomicOrdering::monotonic);
+    if (op.getThread()) {
+      Value end = load(rewriter, loc, cursor, layout::lastTaken);
+      Value isOwn = arith::CmpIOp::create(rewriter, loc,
+                                          arith::CmpIPredicate::slt, unit, end);
+      unit = arith::SelectOp::create(rewriter, loc, isOwn, unit,
+                                     createI64(rewriter, loc, -1));
+    }
+    rewriter.replaceOp(op, toIndex(rewriter, loc, unit));
     return success();
   }
 };
@@ -448,6 +493,7 @@ void piko::populateKernelToLLVMPatterns(const TypeConverter &converter,
                ToAddressLowering, FromAddressLowering,
 
                BeginScheduleLowering, ScheduleBinLowering, GetLowering,
-               GridLowering, DomainLowering, ThreadsLowering, NextUnitLowering>(
+               GridLowering, DomainLowering, ThreadsLowering, ThreadLowering,
+               TakeUnitLowering, NextUnitLowering>(
       converter, patterns.getContext(), context);
 }

@@ -30,7 +30,7 @@ struct Captures {
 
 /// Where a thread runs a unit, as convert-piko-to-openmp has written it.
 struct UnitBody {
-  Operation *loop; ///< In the parallel region.
+  Operation *loop; ///< In the parallel region, or what holds it there.
   Block *block;
   Value unit, count;
 };
@@ -72,12 +72,16 @@ static func::FuncOp outline(Block &block, func::FuncOp kernel,
 //===----------------------------------------------------------------------===//
 
 static UnitBody findUnitBody(omp::ParallelOp parallel) {
-  scf::WhileOp loop =
-      *parallel.getRegion().front().getOps<scf::WhileOp>().begin();
+  Block &thread = parallel.getRegion().front();
+  // If there are any units.
+  auto some = thread.getOps<scf::IfOp>();
+  Block &units = some.empty() ? thread : *(*some.begin()).thenBlock();
+  scf::WhileOp loop = *units.getOps<scf::WhileOp>().begin();
   Block *body = loop.getAfterBody();
   auto goesOn =
       loop.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-  return {loop, body, body->getArgument(0), goesOn.getRhs()};
+  return {thread.findAncestorOpInBlock(*loop), body, body->getArgument(0),
+          goesOn.getRhs()};
 }
 
 /// A unit makes the thread's private arrays, which lie before its loop, anew;

@@ -59,13 +59,16 @@ public:
       moveBody(createLoop().getBody());
       return;
     }
+    // Without units there may be nothing to take them from.
+    any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ne, count,
+                                zero);
     omp::ParallelOperands clauses;
     clauses.numThreads = ThreadsOp::create(rewriter, loc);
     auto parallel = omp::ParallelOp::create(rewriter, loc, clauses);
     rewriter.createBlock(&parallel.getRegion());
     rewriter.setInsertionPoint(omp::TerminatorOp::create(rewriter, loc));
     hoistPrivateArrays(forall, rewriter);
-    share();
+    share(kind);
   }
 
 private:
@@ -82,16 +85,44 @@ private:
                                to->getArgument(0));
   }
 
-  /// Each thread asks the runtime for one unit after the other.
-  void share() {
+  /// The unit that a thread runs next, by what is known of who runs which; no
+  /// number below the count at the end.
+  Value createNext(UnitLoop kind, Value thread) {
+    if (kind == UnitLoop::Asked)
+      return NextUnitOp::create(rewriter, loc, bins);
+    Value taken = TakeUnitOp::create(rewriter, loc, bins, thread);
+    if (kind == UnitLoop::Shared)
+      return taken;
+    // Who has no more helps others, which the runtime sees to.
+    Value own = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
+                                      taken, count);
+    return scf::IfOp::create(
+               rewriter, loc, own,
+               [&](OpBuilder &builder, Location loc) {
+                 scf::YieldOp::create(builder, loc, taken);
+               },
+               [&](OpBuilder &builder, Location loc) {
+                 scf::YieldOp::create(
+                     builder, loc,
+                     NextUnitOp::create(builder, loc, bins).getResult());
+               })
+        .getResult(0);
+  }
+
+  /// Each thread runs one unit after the other.
+  void share(UnitLoop kind) {
+    auto some = scf::IfOp::create(rewriter, loc, any, /*withElse=*/false);
+    rewriter.setInsertionPointToStart(some.thenBlock());
+    Value thread;
+    if (kind == UnitLoop::Mapped)
+      thread = ThreadOp::create(rewriter, loc);
     auto loop = scf::WhileOp::create(rewriter, loc,
                                      TypeRange(rewriter.getIndexType()), {});
     rewriter.createBlock(&loop.getBefore());
-    Value next = NextUnitOp::create(rewriter, loc, bins);
-    // It is -1 at the end.
-    Value any = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
-                                      next, count);
-    scf::ConditionOp::create(rewriter, loc, any, next);
+    Value next = createNext(kind, thread);
+    Value goesOn = arith::CmpIOp::create(
+        rewriter, loc, arith::CmpIPredicate::ult, next, count);
+    scf::ConditionOp::create(rewriter, loc, goesOn, next);
     Block *run = rewriter.createBlock(&loop.getAfter(), {},
                                       rewriter.getIndexType(), loc);
     scf::YieldOp::create(rewriter, loc);
@@ -101,7 +132,7 @@ private:
   scf::ForallOp forall;
   Location loc;
   PatternRewriter &rewriter;
-  Value bins, zero, one, count;
+  Value bins, zero, one, count, any;
 };
 
 struct ConvertForall : OpRewritePattern<scf::ForallOp> {

@@ -22,9 +22,12 @@ void piko::explainUnits(ArrayRef<KernelUnits> kernels, raw_ostream &out) {
   out << "\nUnits of work, of n blocks that fill the device:\n";
   for (const auto &[kernel, order] : kernels)
     out << "  " << kernel
-        << (order == UnitOrder::Taken
-                ? ": a block takes the next one when it has ended one\n"
-                : ": block b takes the units b, b + n, ..\n");
+        << (order == UnitOrder::Fixed
+                ? ": block b takes the units b, b + n, ..\n"
+            : order == UnitOrder::Dispatched
+                ? ": a block has one, which the hardware begins; of more than "
+                  "blocks it takes the next one when it has ended one\n"
+                : ": a block takes the next one when it has ended one\n");
 }
 
 //===----------------------------------------------------------------------===//

@@ -38,11 +38,23 @@ static FlatSymbolRefAttr getStageName(Operation *op) {
   return cast<WorkOpInterface>(op).getStageAttr();
 }
 
-/// What a stage's schedule makes of the loop over its units.
+/// What a stage's schedule makes of the loop over its units. Without one, or if
+/// it is resolved, no scheduler is asked.
 static UnitLoop chooseLoop(ScheduleOp schedule) {
-  bool serial = schedule && schedule.getResolved() &&
-                schedule.getKind() == ScheduleKind::Serialize;
-  return serial ? UnitLoop::Serial : UnitLoop::Shared;
+  if (!schedule)
+    return UnitLoop::Shared;
+  if (!schedule.getResolved())
+    return UnitLoop::Asked;
+  switch (schedule.getKind()) {
+  case ScheduleKind::Serialize:
+    return UnitLoop::Serial;
+  case ScheduleKind::DirectMap:
+    return UnitLoop::Mapped;
+  case ScheduleKind::LoadBalance:
+  case ScheduleKind::All:
+    return UnitLoop::Shared;
+  }
+  llvm_unreachable("not a schedule");
 }
 
 void UnitFormer::createUnits(StageOp stage, IntegerAttr source) {

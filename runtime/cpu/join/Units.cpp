@@ -16,6 +16,7 @@
 #include "cpu/state/Mirrors.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include <omp.h>
 
@@ -226,30 +227,40 @@ void piko::rt::cutUnits(pikort_pipeline &p, const Stage &stage,
 int64_t pikoir_thread(void) { return omp_get_thread_num(); }
 int64_t pikoir_team(void) { return omp_get_num_threads(); }
 
-void UnitCursors::reset(const std::vector<pikoir_unit> &units, int64_t homes) {
-  if (room_ < homes) {
-    cursors_ = std::make_unique<Cursor[]>(homes - firstCore);
-    room_ = homes;
-  }
-  homes_ = homes;
-  nobodys_ = true;
-  for (int64_t owner = firstCore; owner < homes; ++owner) {
-    of(owner).next.store(0, std::memory_order_relaxed);
-    of(owner).end = 0;
-  }
-  for (size_t unit = units.size(); unit-- > 0;) {
-    Cursor &cursor = of(units[unit].owner);
-    cursor.next.store(unit, std::memory_order_relaxed);
-    cursor.end = std::max(cursor.end, static_cast<int64_t>(unit + 1));
-    nobodys_ = nobodys_ && units[unit].owner == nobody;
-  }
+/// Where the cursor of an owner is among all.
+static int64_t indexOf(int64_t owner) {
+  return owner == nobody      ? 0
+         : owner == firstCore ? 1
+                              : PIKOIR_CURSOR_HOMES + owner;
 }
 
-int64_t UnitCursors::take(const pikoir_unit *units, int64_t owner) {
-  Cursor &cursor = of(owner);
-  while (cursor.next.load(std::memory_order_relaxed) < cursor.end) {
-    int64_t unit = cursor.next.fetch_add(1, std::memory_order_relaxed);
-    if (unit < cursor.end && units[unit].owner == owner)
+void UnitCursors::reset(const std::vector<pikoir_unit> &units, int64_t homes,
+                        pikoir_input &input) {
+  static_assert(sizeof(Line) == sizeof(pikoir_cursor));
+  if (room_ < homes) {
+    lines_ = std::make_unique<Line[]>(PIKOIR_CURSOR_HOMES + homes);
+    room_ = homes;
+  }
+  for (int64_t i = 0; i < PIKOIR_CURSOR_HOMES + homes; ++i)
+    lines_[i].cursor = {};
+  input.homes = 0;
+  for (size_t unit = units.size(); unit-- > 0;) {
+    pikoir_cursor &cursor = lines_[indexOf(units[unit].owner)].cursor;
+    cursor.next = static_cast<int64_t>(unit);
+    cursor.end = std::max(cursor.end, static_cast<int64_t>(unit + 1));
+    if (units[unit].owner != nobody)
+      input.homes = homes;
+  }
+  input.cursors = &lines_[0].cursor;
+}
+
+/// The next unit of an owner, or -1 at the end.
+static int64_t take(const pikoir_input &input, int64_t owner) {
+  pikoir_cursor &cursor = input.cursors[indexOf(owner)];
+  std::atomic_ref<int64_t> next(cursor.next);
+  while (next.load(std::memory_order_relaxed) < cursor.end) {
+    int64_t unit = next.fetch_add(1, std::memory_order_relaxed);
+    if (unit < cursor.end && input.units[unit].owner == owner)
       return unit;
   }
   return -1;
@@ -258,24 +269,24 @@ int64_t UnitCursors::take(const pikoir_unit *units, int64_t owner) {
 int64_t pikoir_next_unit(const pikoir_input *input) {
   if (!input->cursors)
     return -1; // there is nothing to do after an error
-  UnitCursors &cursors = *static_cast<UnitCursors *>(input->cursors);
-  if (cursors.areNobodys())
-    return cursors.take(input->units, nobody);
-  int64_t thread = pikoir_thread(), team = pikoir_team(), unit = -1;
-  auto take = [&](int64_t owner) {
-    unit = cursors.take(input->units, owner);
+  int64_t unit = -1;
+  auto takes = [&](int64_t owner) {
+    unit = take(*input, owner);
     return unit >= 0;
   };
-  if (thread == 0 && take(firstCore))
+  if (input->homes == 0)
+    return takes(nobody) ? unit : -1;
+  int64_t thread = pikoir_thread(), team = pikoir_team();
+  if (thread == 0 && takes(firstCore))
     return unit;
   // There may be fewer threads than homes.
-  for (int64_t home = thread; home < cursors.homes(); home += team)
-    if (take(home))
+  for (int64_t home = thread; home < input->homes; home += team)
+    if (takes(home))
       return unit;
-  if (take(nobody))
+  if (takes(nobody))
     return unit;
-  for (int64_t home = 0; home < cursors.homes(); ++home)
-    if (take(home))
+  for (int64_t home = 0; home < input->homes; ++home)
+    if (takes(home))
       return unit;
   return -1;
 }

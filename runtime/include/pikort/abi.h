@@ -113,6 +113,19 @@ typedef struct pikoir_call {
   int64_t end;
 } pikoir_call;
 
+/// How far the units of an owner have been taken: by atomic additions to
+/// `next`, which may go beyond `end`. On a cache line of its own.
+typedef struct pikoir_cursor {
+  int64_t next;
+  int64_t end; ///< After the last one.
+  int64_t unused[6];
+} pikoir_cursor;
+
+/// The cursor of a core's own units, which are consecutive where a schedule
+/// maps all units: PIKOIR_CURSOR_HOMES + core. The first two are of units that
+/// any thread may run, and of those that only the first one does.
+#define PIKOIR_CURSOR_HOMES 2
+
 /// A stage's input: valid until pikoir_end.
 typedef struct pikoir_input {
   const uint8_t *items;  ///< Where records lie.
@@ -126,8 +139,9 @@ typedef struct pikoir_input {
   /// Of a LIST stage, in order of bin and batch; null and 0 for all others.
   const pikoir_call *calls;
   int64_t call_count;
-  int64_t clears; ///< Tiles begin with their clear value: 0 or 1.
-  void *cursors;  ///< The runtime's: which units threads have taken.
+  int64_t clears;         ///< Tiles begin with their clear value: 0 or 1.
+  pikoir_cursor *cursors; ///< Null where there are no units.
+  int64_t homes;          ///< Cores that have units of their own.
 } pikoir_input;
 
 /// One port of a writer. The fields up to `buckets` are the fast path's: see

@@ -29,7 +29,7 @@ extern "C" {
 #endif
 
 /// Changes whenever generated code and runtime would no longer fit together.
-#define PIKORT_ABI_VERSION 13u
+#define PIKORT_ABI_VERSION 14u
 /// The most cells that a domain may have in a dimension, so that sums of
 /// coordinates and small numbers do not wrap around.
 #define PIKORT_MAX_EXTENT 1073741824

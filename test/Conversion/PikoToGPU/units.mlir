@@ -1,5 +1,17 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
-// Which block of a grid runs which unit, by the stage's schedule.
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-pre-schedule,piko-eliminate-schedules,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s --check-prefix=ASKED
+// Which block of a grid runs which unit, by what is resolved of the stage's schedule.
+
+// Where nothing is, blocks take units from a counter, and the hardware starts none.
+// ASKED-LABEL: piko.kernel @kernel_direct
+// ASKED-NOT:     arith.cmpi ule
+// ASKED:         piko.gpu.take_units
+// ASKED-LABEL: piko.kernel @kernel_balanced
+// ASKED-NOT:     arith.cmpi ule
+// ASKED:         piko.gpu.take_units
+// ASKED-LABEL: piko.kernel @kernel_chunks
+// ASKED-NOT:     arith.cmpi ule
+// ASKED:         piko.gpu.take_units
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
@@ -85,6 +97,7 @@ piko.pipeline @P rank 1 {
       piko.assign_all
       piko.return
     }
+    piko.schedule load_balance
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
       %x = piko.get %f "x" : !piko.prim<@F> -> i32

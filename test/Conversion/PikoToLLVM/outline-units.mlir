@@ -20,10 +20,11 @@ piko.record @F {"v" : f32 at 0} size 4 align 4
 // CHECK:         %[[SEVERAL:.*]] = arith.cmpi sgt, %[[THREADS]], %c1_i32
 // CHECK:         scf.if %[[SEVERAL]] {
 // CHECK-NEXT:      omp.parallel num_threads(%[[THREADS]] : i32) {
-// CHECK-NEXT:        scf.while
-// CHECK-NEXT:          llvm.call @pikoir_next_unit
-// CHECK:             ^bb0(%[[I:.*]]: index):
-// CHECK-NEXT:          func.call @P.kernel_a.unit({{.*}}, %[[I]])
+// CHECK-NEXT:        scf.if
+// CHECK-NEXT:          scf.while
+// CHECK:                 llvm.atomicrmw add %{{.*}} monotonic
+// CHECK:               ^bb0(%[[I:.*]]: index):
+// CHECK-NEXT:            func.call @P.kernel_a.unit({{.*}}, %[[I]])
 // CHECK:         } else {
 // CHECK-NEXT:      scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
 // CHECK-NEXT:        func.call @P.kernel_a.unit({{.*}}, %[[I]])
@@ -31,7 +32,7 @@ piko.record @F {"v" : f32 at 0} size 4 align 4
 // Outside of cycles a kernel is as it was.
 // CHECK-LABEL: func.func private @P.kernel_b(
 // CHECK:         omp.parallel
-// CHECK:           llvm.call @pikoir_next_unit
+// CHECK:           llvm.atomicrmw add %{{.*}} monotonic
 // CHECK:           llvm.call @pikoir_open
 // CHECK-NOT:   @P.kernel_b.unit
 piko.pipeline @P rank 1 {

@@ -6,30 +6,40 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // space once a thread.
 // CHECK-LABEL: piko.kernel @kernel_balanced
 // CHECK:         %[[COUNT:.*]] = piko.storage.unit_count %[[BINS:.*]] :
+// CHECK:         %[[SOME:.*]] = arith.cmpi ne, %[[COUNT]], %{{.*}}
 // CHECK:         %[[THREADS:.*]] = piko.cpu.threads
 // CHECK:         omp.parallel num_threads(%[[THREADS]] : i32) {
 // CHECK-NEXT:      %[[ARRAY:.*]] = memref.alloca() : memref<4xi32>
-// CHECK-NEXT:      scf.while
-// CHECK-NEXT:        %[[NEXT:.*]] = piko.cpu.next_unit %[[BINS]] :
-// CHECK-NEXT:        %[[ANY:.*]] = arith.cmpi ult, %[[NEXT]], %[[COUNT]]
-// CHECK-NEXT:        scf.condition(%[[ANY]]) %[[NEXT]]
+// CHECK-NEXT:      scf.if %[[SOME]] {
+// CHECK-NEXT:        scf.while
+// CHECK-NEXT:          %[[NEXT:.*]] = piko.cpu.take_unit %[[BINS]] :
+// CHECK-NEXT:          %[[ANY:.*]] = arith.cmpi ult, %[[NEXT]], %[[COUNT]]
+// CHECK-NEXT:          scf.condition(%[[ANY]]) %[[NEXT]]
 // CHECK:           ^bb0(%[[UNIT:.*]]: index):
 // CHECK-NEXT:        piko.cpu.open_writer %{{.*}}[%[[UNIT]]]
 // CHECK:             memref.store %{{.*}}, %[[ARRAY]]
 // CHECK:             scf.yield
 // CHECK:         piko.storage.close_bins
 
-// The runtime knows which units have their home with a thread.
+// A thread takes the units that have their home with it. At their end the runtime says
+// whom it helps.
 // CHECK-LABEL: piko.kernel @kernel_mapped
+// CHECK:         %[[COUNT:.*]] = piko.storage.unit_count %[[BINS:.*]] :
 // CHECK:         omp.parallel
-// CHECK:           scf.while
-// CHECK-NEXT:        piko.cpu.next_unit
+// CHECK:           %[[THREAD:.*]] = piko.cpu.thread
+// CHECK-NEXT:      scf.while
+// CHECK-NEXT:        %[[OWN:.*]] = piko.cpu.take_unit %[[BINS]] of %[[THREAD]] :
+// CHECK-NEXT:        %[[HAS:.*]] = arith.cmpi ult, %[[OWN]], %[[COUNT]]
+// CHECK-NEXT:        %[[NEXT:.*]] = scf.if %[[HAS]] -> (index) {
+// CHECK-NEXT:          scf.yield %[[OWN]]
+// CHECK-NEXT:        } else {
+// CHECK-NEXT:          piko.cpu.next_unit %[[BINS]]
 
 // CHECK-LABEL: piko.kernel @kernel_serial
 // CHECK-NOT:     omp.
 // CHECK:         scf.for
 
-// What no pass has resolved it hands out as well.
+// What no pass has resolved the runtime schedules, unit by unit.
 // CHECK-LABEL: piko.kernel @kernel_queued
 // CHECK:         omp.parallel
 // CHECK:           scf.while

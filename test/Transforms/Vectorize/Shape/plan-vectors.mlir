@@ -60,8 +60,8 @@ piko.record @N {"n" : i32 at 0} size 4 align 4
 // SHAPED-NOT:    scf.while
 // SHAPED:        piko.iterations
 // SHAPED:        piko.vector_lanes = 32 : i64
-// KEPT:          scf.while
-// KEPT:          scf.while
+// KEPT:          scf.for %{{.*}} = %c0 to %c8
+// KEPT:            scf.while
 // KEPT-NOT:      piko.iterations
 // KEPT:          piko.storage.close_bins
 piko.pipeline @Searches rank 1 {

@@ -43,8 +43,10 @@ def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
 
 /// The `piko.units` of a loop over units of work.
 def Piko_UnitLoop : I32EnumAttr<"UnitLoop", "how threads share units of work", [
-  I32EnumAttrCase<"Shared", 0, "shared">,   // each takes the next one
-  I32EnumAttrCase<"Serial", 1, "serial">]> { // one thread runs them all
+  I32EnumAttrCase<"Shared", 0, "shared">, // each takes the next one
+  I32EnumAttrCase<"Serial", 1, "serial">, // one thread runs them all
+  I32EnumAttrCase<"Mapped", 2, "mapped">, // each takes those of its own first
+  I32EnumAttrCase<"Asked", 3, "asked">]> { // the runtime schedules each
   let cppNamespace = "::piko";
   let genSpecializedAttr = 0;
 }

@@ -482,6 +482,36 @@ def Piko_ThreadsOp : Piko_CPUOp<"threads", [Pure]> {
   let assemblyFormat = "attr-dict";
 }
 
+def Piko_ThreadOp : Piko_CPUOp<"thread", [MemoryEffects<[MemRead]>]> {
+  let summary = "the number of the thread, of those that share a kernel";
+  let description = [{
+    ```mlir
+    %t = piko.cpu.thread
+    ```
+  }];
+  let results = (outs Index:$result);
+  let assemblyFormat = "attr-dict";
+}
+
+def Piko_TakeUnitOp : Piko_CPUOp<"take_unit", [
+    MemoryEffects<[MemRead, MemWrite]>]> {
+  let summary = "the next unit of work, without a scheduler";
+  let description = [{
+    By an atomic addition: the next one of those that any thread may run, a number that
+    is not below their count at the end; or, of a thread, the next one of those that
+    have their home with it, -1 at the end.
+
+    ```mlir
+    %u = piko.cpu.take_unit %bins : !piko.bins<@Fragment>
+    %v = piko.cpu.take_unit %bins of %t : !piko.bins<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_BinsType:$bins, Optional<Index>:$thread);
+  let results = (outs Index:$result);
+  let assemblyFormat =
+      "$bins (`of` $thread^)? attr-dict `:` qualified(type($bins))";
+}
+
 def Piko_NextUnitOp : Piko_CPUOp<"next_unit", [
     MemoryEffects<[MemRead, MemWrite]>]> {
   let summary = "the unit of work that a thread runs next";
