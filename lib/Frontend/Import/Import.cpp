@@ -26,9 +26,8 @@ using llvm::success;
 PhaseImporter::PhaseImporter(llvm::Function &source, WrapperKind phase,
                              unsigned stage, ParsedUnit &unit,
                              MemoryMap &memory, mlir::MLIRContext &context)
-    : source(source), phase(phase), stage(unit.pipeline.stages[stage]),
-      unit(unit), memory(memory), context(context), loops(source, unit.markers),
-      builder(&context), scalars(builder, values) {}
+    : MemoryImporter(source, phase, stage, unit, memory, context),
+      loops(source, unit.markers) {}
 
 mlir::OwningOpRef<mlir::func::FuncOp> PhaseImporter::run() {
   function =
@@ -46,31 +45,6 @@ mlir::OwningOpRef<mlir::func::FuncOp> PhaseImporter::run() {
     if (failed(importTerminator(block->getTerminator())))
       return nullptr;
   return std::move(function);
-}
-
-mlir::InFlightDiagnostic
-PhaseImporter::fail(const llvm::Instruction *instruction) {
-  return emitUserError(instruction, unit, context);
-}
-
-LogicalResult PhaseImporter::reject(const llvm::Instruction *instruction,
-                                    const llvm::Twine &what) {
-  return fail(instruction) << "not supported in Piko: " << what;
-}
-
-LogicalResult PhaseImporter::expectPhase(const llvm::Instruction *instruction,
-                                         WrapperKind expected,
-                                         llvm::StringRef what) {
-  if (phase == expected)
-    return success();
-  return fail(instruction) << "expected " << what
-                           << " in a process phase, but stage '" << stage.name
-                           << "' has one in another";
-}
-
-void PhaseImporter::setLocation(const llvm::Instruction *instruction) {
-  location = getUserLocation(instruction, unit, context);
-  scalars.setLocation(*location);
 }
 
 //===----------------------------------------------------------------------===//
@@ -137,6 +111,8 @@ LogicalResult PhaseImporter::importInstruction(llvm::Instruction *instruction) {
     if (const Marker *marker = getMarker(call, unit.markers))
       return importMarker(call, *marker);
     llvm::StringRef name = call->getCalledFunction()->getName();
+    if (name == accessor::reduceBegin || name == accessor::scanBegin)
+      return importCombination(call, name);
     if (name.starts_with("piko."))
       return importAccessor(call, name);
   }

@@ -118,19 +118,6 @@ void PhaseImporter::importLoopExit(const ParallelLoop *loop) {
   }
 }
 
-/// A call that takes the same numbers and gives them `count` times over.
-mlir::func::CallOp PhaseImporter::makePlaceholder(llvm::StringRef name,
-                                                  llvm::CallInst *call,
-                                                  unsigned count) {
-  llvm::SmallVector<mlir::Value> operands;
-  for (llvm::Value *value : call->args())
-    operands.push_back(scalars.get(value));
-  llvm::SmallVector<mlir::Type> types;
-  for (unsigned i = 0; i < count; ++i)
-    llvm::append_range(types, mlir::ValueRange(operands).getTypes());
-  return make<mlir::func::CallOp>(name, types, operands);
-}
-
 /// Which of the calls that are reductions the user's text makes.
 static std::string getReductionName(llvm::CallInst *call,
                                     const ParsedUnit &unit) {

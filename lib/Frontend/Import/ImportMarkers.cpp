@@ -10,20 +10,6 @@ using llvm::failure;
 using llvm::LogicalResult;
 using llvm::success;
 
-LogicalResult PhaseImporter::setIndex(llvm::CallInst *call, mlir::Value index) {
-  values[call] = scalars.fromIndex(index, scalars.getType(call->getType()));
-  return success();
-}
-
-mlir::Value PhaseImporter::getIndex(llvm::CallInst *call, unsigned operand) {
-  return scalars.toIndex(scalars.get(call->getArgOperand(operand)));
-}
-
-int64_t PhaseImporter::getConstant(llvm::CallInst *call, unsigned operand) {
-  return llvm::cast<llvm::ConstantInt>(call->getArgOperand(operand))
-      ->getSExtValue();
-}
-
 LogicalResult PhaseImporter::importMarker(llvm::CallInst *call,
                                           const Marker &marker) {
   switch (marker.kind) {

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
 #include "Cleanup/FillVariables.h"
-#include "Import/PhaseImporter.h"
+#include "Cleanup/ParallelLoops.h"
+#include "Import/MemoryImporter.h"
 #include "Piko/Dialect/Piko/IR/PikoCheck.h"
 #include "Support/Accessors.h"
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -92,7 +93,7 @@ static const llvm::Instruction *findVirtual(const llvm::Value *pointer,
   return nullptr;
 }
 
-LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
+LogicalResult MemoryImporter::rejectVariable(llvm::AllocaInst *variable) {
   if (const llvm::Instruction *made = findVirtual(variable))
     return reject(made->getDebugLoc() ? made : findLocatedUse(variable),
                   "an object of a class with virtual functions" +
@@ -111,7 +112,7 @@ LogicalResult PhaseImporter::rejectVariable(llvm::AllocaInst *variable) {
                     "'; access its members by name and its arrays by index");
 }
 
-LogicalResult PhaseImporter::checkLocalSize(llvm::AllocaInst *variable) {
+LogicalResult MemoryImporter::checkLocalSize(llvm::AllocaInst *variable) {
   int64_t size = memory.data.getTypeAllocSize(variable->getAllocatedType());
   localBytes += size;
   if (localBytes <= localLimit)
@@ -125,7 +126,7 @@ LogicalResult PhaseImporter::checkLocalSize(llvm::AllocaInst *variable) {
          << " they take " << localBytes;
 }
 
-LogicalResult PhaseImporter::importArray(llvm::AllocaInst *variable) {
+LogicalResult MemoryImporter::importArray(llvm::AllocaInst *variable) {
   llvm::Type *type = variable->getAllocatedType();
   int64_t count = 1;
   while (auto *array = dyn_cast<llvm::ArrayType>(type)) {
@@ -148,8 +149,8 @@ LogicalResult PhaseImporter::importArray(llvm::AllocaInst *variable) {
 }
 
 /// An address in an array as the index of an element of `size` bytes.
-mlir::Value PhaseImporter::makeElementIndex(const Address &address,
-                                            int64_t size) {
+mlir::Value MemoryImporter::makeElementIndex(const Address &address,
+                                             int64_t size) {
   // Not every term need be a multiple of the size, though their sum is.
   bool divides = llvm::all_of(
       address.terms, [&](const auto &term) { return term.second % size == 0; });
@@ -174,7 +175,8 @@ mlir::Value PhaseImporter::makeElementIndex(const Address &address,
   return index;
 }
 
-LogicalResult PhaseImporter::importArrayAccess(llvm::Instruction *instruction) {
+LogicalResult
+MemoryImporter::importArrayAccess(llvm::Instruction *instruction) {
   auto *store = dyn_cast<llvm::StoreInst>(instruction);
   if (store && llvm::isa<llvm::UndefValue>(store->getValueOperand()))
     return success();
@@ -216,8 +218,8 @@ LogicalResult PhaseImporter::importArrayAccess(llvm::Instruction *instruction) {
 // State and primitives
 //===--------------------------------------------------------------------===//
 
-const StateDescription *PhaseImporter::getState(llvm::CallInst *user,
-                                                llvm::Value *handle) {
+const StateDescription *MemoryImporter::getState(llvm::CallInst *user,
+                                                 llvm::Value *handle) {
   const StateDescription *state = memory.getState(handle);
   if (!state)
     reject(user, memory.isChosenState(handle)
@@ -229,7 +231,7 @@ const StateDescription *PhaseImporter::getState(llvm::CallInst *user,
   return state;
 }
 
-llvm::SmallVector<mlir::Value> PhaseImporter::getCoordinates(
+llvm::SmallVector<mlir::Value> MemoryImporter::getCoordinates(
     llvm::iterator_range<llvm::User::op_iterator> operands, int64_t rank) {
   llvm::SmallVector<mlir::Value> coordinates;
   for (llvm::Value *operand :
@@ -238,9 +240,9 @@ llvm::SmallVector<mlir::Value> PhaseImporter::getCoordinates(
   return coordinates;
 }
 
-LogicalResult PhaseImporter::getPlace(llvm::CallInst *call,
-                                      unsigned firstElement,
-                                      MemoryPlace &place) {
+LogicalResult MemoryImporter::getPlace(llvm::CallInst *call,
+                                       unsigned firstElement,
+                                       MemoryPlace &place) {
   auto *base = cast<llvm::CallInst>(call->getArgOperand(0));
   unsigned leaf =
       cast<llvm::ConstantInt>(call->getArgOperand(1))->getZExtValue();
@@ -287,8 +289,8 @@ static DivisionKind getDivisionKind(unsigned opcode) {
   }
 }
 
-LogicalResult PhaseImporter::importDivision(llvm::CallInst *call,
-                                            unsigned opcode) {
+LogicalResult MemoryImporter::importDivision(llvm::CallInst *call,
+                                             unsigned opcode) {
   mlir::Value a = scalars.get(call->getArgOperand(0));
   mlir::Value b = scalars.get(call->getArgOperand(1));
   if (!a || !b || a.getType().getIntOrFloatBitWidth() > 64)
@@ -298,8 +300,8 @@ LogicalResult PhaseImporter::importDivision(llvm::CallInst *call,
   return success();
 }
 
-LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
-                                            llvm::StringRef name) {
+LogicalResult MemoryImporter::importAccessor(llvm::CallInst *call,
+                                             llvm::StringRef name) {
   if (std::optional<unsigned> opcode = getDivision(name))
     return importDivision(call, *opcode);
   if (name.starts_with(undefinedName)) {
@@ -311,8 +313,6 @@ LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
     return importEmit(call);
   if (name == accessor::updateBegin)
     return importUpdateBegin(call);
-  if (name == accessor::reduceBegin || name == accessor::scanBegin)
-    return importCombination(call, name);
   if (name == accessor::combineEnd) {
     placeholders[call] = makePlaceholder(combineEndName, call, 1);
     return success();
@@ -346,7 +346,7 @@ LogicalResult PhaseImporter::importAccessor(llvm::CallInst *call,
                                            : importAtomic(call);
 }
 
-LogicalResult PhaseImporter::importLoad(llvm::CallInst *call) {
+LogicalResult MemoryImporter::importLoad(llvm::CallInst *call) {
   MemoryPlace place;
   if (failed(getPlace(call, 2, place)))
     return failure();
@@ -367,7 +367,7 @@ LogicalResult PhaseImporter::importLoad(llvm::CallInst *call) {
   return success();
 }
 
-LogicalResult PhaseImporter::importStore(llvm::CallInst *call) {
+LogicalResult MemoryImporter::importStore(llvm::CallInst *call) {
   MemoryPlace place;
   if (failed(getPlace(call, 3, place)))
     return failure();
@@ -397,8 +397,8 @@ static AtomicKind getAtomicKind(llvm::CallInst *call) {
   }
 }
 
-LogicalResult PhaseImporter::expectUnordered(llvm::CallInst *call,
-                                             bool isFetch) {
+LogicalResult MemoryImporter::expectUnordered(llvm::CallInst *call,
+                                              bool isFetch) {
   if (stage.schedule.unordered)
     return success();
   return fail(call) << "expected "
@@ -408,7 +408,7 @@ LogicalResult PhaseImporter::expectUnordered(llvm::CallInst *call,
                     << stage.name << "' is not";
 }
 
-LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
+LogicalResult MemoryImporter::importAtomic(llvm::CallInst *call) {
   MemoryPlace place;
   if (failed(getPlace(call, 5, place)))
     return failure();
@@ -428,7 +428,7 @@ LogicalResult PhaseImporter::importAtomic(llvm::CallInst *call) {
   return success();
 }
 
-LogicalResult PhaseImporter::importUpdateBegin(llvm::CallInst *call) {
+LogicalResult MemoryImporter::importUpdateBegin(llvm::CallInst *call) {
   if (failed(expectPhase(call, WrapperKind::Process, "update")))
     return failure();
   const StateDescription *state = getState(call, call->getArgOperand(0));
@@ -444,7 +444,7 @@ LogicalResult PhaseImporter::importUpdateBegin(llvm::CallInst *call) {
   return success();
 }
 
-LogicalResult PhaseImporter::importEmit(llvm::CallInst *call) {
+LogicalResult MemoryImporter::importEmit(llvm::CallInst *call) {
   if (failed(expectPhase(call, WrapperKind::Process, "emit")))
     return failure();
   auto *port = dyn_cast<llvm::ConstantInt>(call->getArgOperand(0));
