@@ -69,7 +69,7 @@ function(piko_add_precompiled target header)
     ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/${header})
   set(dialect ${PROJECT_SOURCE_DIR}/include/Piko/Dialect/Piko/IR)
   file(GLOB headers CONFIGURE_DEPENDS
-    ${dialect}/*.h ${dialect}/*.td ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/Precompiled*.h)
+    ${dialect}/*.h ${dialect}/*.td ${dialect}/Ops/*.td ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/Precompiled*.h)
   set(sum ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/cmake_pch.hxx.pch.sum)
   set(hash ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/HashHeaders.cmake)
   add_custom_command(OUTPUT ${sum}

@@ -69,6 +69,8 @@ def parse_arguments():
                         help="where pikoc is built (%(default)s)")
     parser.add_argument("--cpu", default="native", help="(%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--sample", type=int, default=1, metavar="N",
+                        help="of test/EndToEnd, every Nth file (%(default)s)")
     parser.add_argument("--passes", help="of these alone, between commas")
     parser.add_argument("--least", type=int, default=4, metavar="LINES",
                         help="of a pipeline that change at most where it is as it "
@@ -78,6 +80,8 @@ def parse_arguments():
     parser.add_argument("--times", type=int, default=3, metavar="PIPELINES",
                         help="that are run for each pass (%(default)s)")
     parser.add_argument("--rounds", type=int, default=5, help="(%(default)s)")
+    parser.add_argument("--threads", type=int, default=os.cpu_count(),
+                        help="of what is run (%(default)s)")
     parser.add_argument("--report", action="store_true",
                         help="no error where a pass pays on too few")
     return parser.parse_args()
@@ -91,15 +95,22 @@ def run(command):
 
 
 def list_texts(arguments):
-    if arguments.texts:
-        return [Text(file, [], "texts") for file in arguments.texts]
     examples = [Text(file, [], "examples")
                 for file in sorted(ROOT.glob("examples/*/*.piko.cpp"))]
     measured = [Text(Path(bodies.get_source(body)), bodies.get_includes(), "bodies")
                 for body in bodies.find_bodies()]
     tests = [Text(file, [], "tests")
-             for file in sorted(ROOT.glob("test/EndToEnd/*/*.cpp"))]
-    return examples + measured + tests
+             for file in sorted(ROOT.glob("test/EndToEnd/*/*.cpp"))
+             [::arguments.sample]]
+    texts = examples + measured + tests
+    if not arguments.texts:
+        return texts
+    known = {text.file.resolve(): text for text in texts}
+    for file in arguments.texts:
+        if not file.is_file():
+            sys.exit(f"ablate: expected a file, but got '{file}'")
+    return [known.get(file.resolve(), Text(file, [], "texts"))
+            for file in arguments.texts]
 
 
 def list_passes(arguments):
@@ -171,6 +182,7 @@ class Timer:
         self.bin, self.lib = f"{arguments.build}/bin", f"{arguments.build}/lib"
         self.root, self.work = str(ROOT), folder
         self.cpu, self.rounds = arguments.cpu, arguments.rounds
+        self.threads = arguments.threads
         self.scene, self.march = [BUNNY], None
         self.warmup, self.frames, self.seconds = 6, 11, 0.4
 
@@ -189,12 +201,13 @@ class Timer:
             body = pipeline.text.file.name.removesuffix(".piko.cpp")
             builds = {"default": [], "ablated": [f"--without={without}"]}
             bodies.build_compiled(self, body, builds)
-            times = bodies.measure_rounds(self, body, builds)
+            times = bodies.measure_rounds(self, body, builds, self.threads)
             pairs = list(zip(times["default"], times["ablated"]))
         else:
             example = pipeline.text.file.parent.name
+            threads = ["--threads", str(self.threads)]
             pairs = [tuple(kernels.render(self, example, pipeline.name,
-                                          more)["ms_median"]
+                                          [*threads, *more])["ms_median"]
                            for more in ([], options)) for _ in range(self.rounds)]
         return (statistics.median(b / a for a, b in pairs),
                 statistics.median(a for a, _ in pairs))

@@ -35,6 +35,8 @@ std::optional<UnitOrder> piko::getUnitOrder(KernelOp kernel) {
   if (!schedule)
     return UnitOrder::Dispatched;
   // One that depends on the bin has units of all kinds.
+  if (!schedule.getBody().empty())
+    return UnitOrder::Dispatched;
   if (!schedule.getResolved())
     return UnitOrder::Taken;
   ScheduleKind kind = schedule.getKind();

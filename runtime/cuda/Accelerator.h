@@ -11,9 +11,9 @@
 #define PIKO_RUNTIME_CUDA_ACCELERATOR_H
 
 #include "common/Accelerator.h"
-#include "cuda/Frame.h"
 #include "cuda/Module.h"
 #include "cuda/Submission.h"
+#include "cuda/frame/Frame.h"
 
 #include <string>
 #include <unordered_map>

@@ -12,7 +12,7 @@
 #define PIKO_RUNTIME_CUDA_CUDAEXECUTOR_H
 
 #include "cpu/CPUExecutor.h"
-#include "cuda/Frame.h"
+#include "cuda/frame/Frame.h"
 
 namespace piko::cuda {
 

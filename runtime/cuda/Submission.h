@@ -11,8 +11,8 @@
 #define PIKO_RUNTIME_CUDA_SUBMISSION_H
 
 #include "cuda/Device.h"
-#include "cuda/Frame.h"
 #include "cuda/KernelTimes.h"
+#include "cuda/frame/Frame.h"
 
 namespace piko::cuda {
 

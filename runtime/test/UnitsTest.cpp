@@ -5,6 +5,7 @@
 #include "pikort/pikort.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <gtest/gtest.h>
 #include <omp.h>
 #include <vector>
@@ -55,6 +56,28 @@ void takeAll(const pikoir_input *input) {
   std::vector<int64_t> &list = taken[omp_get_thread_num()];
   for (int64_t u; (u = pikoir_next_unit(input)) >= 0;)
     list.push_back(u);
+}
+
+int64_t takeFrom(pikoir_cursor &cursor) {
+  return std::atomic_ref(cursor.next).fetch_add(1, std::memory_order_relaxed);
+}
+
+/// As a kernel does whose schedule is eliminated.
+void takeNext(const pikoir_input *input) {
+  std::vector<int64_t> &list = taken[omp_get_thread_num()];
+  for (int64_t u; (u = takeFrom(input->cursors[0])) < input->unit_count;)
+    list.push_back(u);
+}
+
+/// As one does that is pre-scheduled: first its own.
+void takeOwn(const pikoir_input *input) {
+  int64_t thread = omp_get_thread_num();
+  pikoir_cursor &cursor = input->cursors[PIKOIR_CURSOR_HOMES + thread];
+  for (int64_t u; (u = takeFrom(cursor)) < cursor.end;) {
+    EXPECT_EQ(input->units[u].owner, thread);
+    taken[thread].push_back(u);
+  }
+  takeAll(input);
 }
 
 /// Of two threads, the first one begins when the other one has found no more.
@@ -125,6 +148,29 @@ TEST(Units, OnlyTheFirstRunsSerializedBins) {
   runUnits(PIKOIR_SERIALIZE, takeLate);
   checkOnce();
   EXPECT_TRUE(taken[1].empty());
+}
+
+TEST(Units, KernelsTakeThemWithoutACall) {
+  for (int32_t kind :
+       {PIKOIR_LOAD_BALANCE, PIKOIR_DIRECT_MAP, PIKOIR_SERIALIZE, PIKOIR_ALL}) {
+    runUnits(kind, [](const pikoir_input *input) {
+#pragma omp parallel num_threads(threads)
+      takeNext(input);
+    });
+    checkOnce();
+  }
+  for (void (*how)(const pikoir_input *) :
+       {+[](const pikoir_input *input) {
+#pragma omp parallel num_threads(threads)
+          takeOwn(input);
+        },
+        +[](const pikoir_input *input) { // of fewer than homes
+#pragma omp parallel num_threads(2)
+          takeOwn(input);
+        }}) {
+    runUnits(PIKOIR_DIRECT_MAP, how);
+    checkOnce();
+  }
 }
 
 TEST(Units, AllThreadsAtOnce) {

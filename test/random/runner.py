@@ -25,7 +25,9 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "narrow-integers", "merge-gathers", "pair-gathers", "if-convert",
           "unswitch-versions",
           "uplift-pixel-loops", "privatize", "reduce-updates",
-          "reduce-by-atomics"]
+          "reduce-by-atomics",
+          "collapse-pixels", "group-updates", "share-by-count", "compact-work",
+          "split-rare"]
 
 
 def options_of(passes):

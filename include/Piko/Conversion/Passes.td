@@ -135,8 +135,46 @@ def MapThreads : Pass<"piko-map-threads", "::piko::PipelineOp"> {
     Option<"threads", "threads", "int64_t", "0",
            "Threads of a block, a power of two up to 1024 (default: what the "
            "stage has, rounded down to one; more where a bin has more than 16 "
-           "pixels for each, or is the whole domain, up to 256)">];
+           "pixels for each, or is the whole domain, up to 256)">,
+    Option<"collapses", "collapse", "bool", "true",
+           "threads take the pixels of many primitives as one space">,
+    Option<"groups", "group", "bool", "true",
+           "threads share updates whose pixels follow from data, in groups">,
+    Option<"counts", "by-count", "bool", "true",
+           "the number of a bin's primitives says whether threads have some each">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def ExpandRemainders : Pass<"piko-expand-remainders", "::piko::PipelineOp"> {
+  let summary = "Divide floats with remainder by integers";
+  let description = [{
+    **Requires** the machine level (`piko-form-work`); before `convert-piko-to-gpu`.
+
+    **Does**: expands the remainder of floats of 32 and 64 bits, C's `fmod`, which a
+    GPU has no instruction for: long division of the significands, as many bits at a
+    time as an integer has room for.
+
+    **Guarantees** the bits of `fmod`: each step is exact.
+
+    Before:
+    ```
+    %r = arith.remf %x, %y : f32
+    ```
+    After:
+    ```
+    %r = scf.if %is_known -> (f32) {
+      scf.yield %small : f32        // |x| < |y|, or a NaN
+    } else {
+      %rest:2 = scf.while (%d = %first, %left = %places) ... // 40 bits at a time
+      ...
+    }
+    ```
+
+    **Limits**: other floats stay.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect",
                            "::mlir::scf::SCFDialect"];
 }
 
@@ -190,6 +228,11 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     **Limits**: functions with other bits in PTX, tiles, local edges into other bins
     and illegal mappings are errors.
   }];
+  let options = [
+    Option<"compacts", "compact", "bool", "true",
+           "put off atomics of inner loops until all threads have some">,
+    Option<"splitsRare", "rare", "bool", "true",
+           "give rare branches functions and launches of their own">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::gpu::GPUDialect",
                            "::mlir::math::MathDialect",

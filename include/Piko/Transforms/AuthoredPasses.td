@@ -214,17 +214,15 @@ def InferDirectives : Pass<"piko-infer-directives", "::piko::PipelineOp"> {
 def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
   let summary = "Make directives of schedules that say the same of every bin";
   let description = [{
-    **Requires** the authored level; best after canonicalization, which folds what a
-    schedule computes.
+    **Requires** the authored level; best after canonicalization.
 
     **Does**: follows all ways through the `dynamic` body of each schedule. Where they
-    all end with the same directives, these become the schedule's own, and the body is
-    erased. Nothing then runs for each bin, and `piko-fuse-stages` sees the kind. A
-    schedule without a body that is `direct_map`, `serialize` or `all` becomes
+    end with the same directives, these become the schedule's own, and the body is
+    erased. A schedule without a body that is `direct_map`, `serialize` or `all` becomes
     `resolved`: who runs a bin is known when it is joined, and kernels ask no scheduler.
-    Of `direct_map`, a thread of a CPU takes the units of its own (`piko.units =
-    #piko<units mapped>`), and block `b` of `n` on a GPU has those of number `b`, `b +
-    n`, ... Of `serialize`, one loop runs all; of `all`, any thread takes the next one.
+    Of `direct_map`, a CPU's thread takes its own units first (`piko.units =
+    #piko<units mapped>`), and a GPU's block `b` of `n` those of number `b`, `b + n`, ... Of
+    `serialize`, one loop runs all; of `all`, any thread takes the next.
 
     **Guarantees** that each bin has the directives that it had.
 
@@ -247,9 +245,9 @@ def PreSchedule : Pass<"piko-pre-schedule", "::piko::PipelineOp"> {
     piko.schedule serialize resolved
     ```
 
-    **Limits**: a schedule that depends on its bin or on the state's constants keeps
-    its body, which runs for each bin before the pipeline does. So does one that would
-    end with an error. A remark says why.
+    **Limits**: a schedule that depends on its bin or on constants keeps its body, which
+    runs for each bin before the pipeline does; so does one that would fail. A remark
+    says why.
   }];
 }
 

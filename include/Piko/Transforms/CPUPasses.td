@@ -133,8 +133,8 @@ def HoistLoads : Pass<"piko-hoist-loads", "::piko::PipelineOp"> {
 def IfConvert : Pass<"piko-if-convert", "::piko::PipelineOp"> {
   let summary = "Choose values without branches";
   let description = [{
-    **Requires** loops over units (`piko-form-units`); before `piko-vectorize`, which
-    then has no branches to mask.
+    **Requires** loops over units (`piko-form-units`); before `piko-plan-vectors`,
+    which then counts no branches to mask.
 
     **Does**: if-conversion. It takes `scf.if` and `scf.index_switch` whose arms only
     read fields and compare, convert and choose integers. What the arms hold moves

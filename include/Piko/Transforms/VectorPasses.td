@@ -130,6 +130,7 @@ def PlanVectors : Pass<"piko-plan-vectors", "::piko::PipelineOp"> {
     than 16 KiB of arrays stay scalar.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::math::MathDialect",
                            "::mlir::memref::MemRefDialect",
                            "::mlir::scf::SCFDialect"];
   let options = [
@@ -159,8 +160,8 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
     **Does**: runs that many iterations at once. What lanes share stays scalar; the rest
     becomes vectors, by predication. Access becomes gathers and scatters, or masked
     loads and stores of rows. What is ordered, or has no vector form, runs lane by lane,
-    in a loop marked `piko.turns`, which may be planned again. A mark on what cannot
-    become vectors is an error.
+    in a loop that `marks-turns` marks (`piko.turns`), to be planned again: the CPU's
+    sequence does so twice. A mark on what cannot become vectors is an error.
 
     **Guarantees** the same operations for each iteration, emissions and updates in
     order, and the same bits for any number of lanes.
@@ -195,6 +196,9 @@ def Vectorize : Pass<"piko-vectorize", "::piko::PipelineOp"> {
 
     **Limits**: 4, 8, 16 or 32 lanes.
   }];
+  let options = [
+    Option<"marksTurns", "marks-turns", "bool", "true",
+           "mark loops of what lanes do in turns, for piko-plan-vectors">];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::math::MathDialect",
                            "::mlir::memref::MemRefDialect",
@@ -380,7 +384,7 @@ def PairGathers : Pass<"piko-pair-gathers", "::piko::PipelineOp"> {
 def UnswitchVersions : Pass<"piko-unswitch-versions", "::piko::PipelineOp"> {
   let summary = "Make a body for units that run all inner loops as scalar loops";
   let description = [{
-    **Requires** versions (`piko-vectorize`); before `convert-piko-to-openmp`.
+    **Requires** versions (`piko-plan-vectors`); before `convert-piko-to-openmp`.
 
     **Does**: loop unswitching. The scalar version of a loop over primitives may hold
     loops in two versions itself, each chosen once for a unit. It becomes two bodies:

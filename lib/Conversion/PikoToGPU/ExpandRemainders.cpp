@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// The remainder of floats, which PTX has no instruction for: long division of
-// the significands, as many bits at a time as an integer has room for. Each
-// step is exact, as is what C's fmod gives.
+// piko-expand-remainders: the remainder of floats, which PTX has no instruction
+// for, by long division of the significands, as many bits at a time as an
+// integer has room for. Each step is exact, as is what C's fmod gives.
 
-#include "PikoToGPU/PikoToGPU.h"
+#include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/Piko.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/Math/IR/Math.h"
+#include "mlir/Dialect/SCF/IR/SCF.h"
+
+namespace piko {
+#define GEN_PASS_DEF_EXPANDREMAINDERS
+#include "Piko/Conversion/Passes.h.inc"
+} // namespace piko
 
 using namespace mlir;
 using namespace piko;
@@ -165,11 +172,21 @@ Value RemainderExpansion::expand() {
   return choice.getResult(0);
 }
 
-void piko::expandRemainders(KernelOp kernel) {
+namespace {
+
+struct ExpandRemaindersPass
+    : piko::impl::ExpandRemaindersBase<ExpandRemaindersPass> {
+  void runOnOperation() override;
+};
+
+} // namespace
+
+void ExpandRemaindersPass::runOnOperation() {
   SmallVector<arith::RemFOp> remainders;
-  kernel.walk([&](arith::RemFOp op) {
-    // Others are refused.
-    if (op.getType().isF32() || op.getType().isF64())
+  getOperation().walk([&](arith::RemFOp op) {
+    // Others are refused by convert-piko-to-gpu.
+    if (op->getParentOfType<KernelOp>() &&
+        (op.getType().isF32() || op.getType().isF64()))
       remainders.push_back(op);
   });
   for (arith::RemFOp op : remainders) {

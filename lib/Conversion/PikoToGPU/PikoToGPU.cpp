@@ -43,11 +43,17 @@ using namespace piko;
 
 namespace {
 
+/// What may be left out.
+struct GridOptions {
+  bool compacts, splitsRare;
+};
+
 class GridBuilder {
 public:
-  GridBuilder(KernelOp kernel, StageOp stage, int64_t threads)
-      : kernel(kernel), stage(stage), threads(threads), loc(kernel.getLoc()),
-        order(*getUnitOrder(kernel)) {}
+  GridBuilder(KernelOp kernel, StageOp stage, int64_t threads,
+              GridOptions options)
+      : kernel(kernel), stage(stage), threads(threads), options(options),
+        loc(kernel.getLoc()), order(*getUnitOrder(kernel)) {}
 
   /// Threads share the pixels of a bin, of one primitive after the other or of
   /// many.
@@ -72,6 +78,7 @@ private:
   KernelOp kernel;
   StageOp stage;
   int64_t threads;
+  GridOptions options;
   Location loc;
   UnitOrder order;
   Value bins;
@@ -373,11 +380,12 @@ LogicalResult GridBuilder::mapWork() {
       shared.push_back(loop);
   });
   for (scf::ForOp loop : shared)
-    compactWork(loop, memory, threads);
+    if (options.compacts)
+      compactWork(loop, memory, threads);
   std::optional<GridMemory> rest;
   bool hasRare = false;
   // What a launch leaves is for the kernel itself.
-  if (kernel.getPrecedes())
+  if (kernel.getPrecedes() || !options.splitsRare)
     shared.clear();
   for (scf::ForOp loop : shared) {
     bool isRare = setRareBranchesApart(loop);
@@ -446,12 +454,11 @@ LogicalResult ConvertPikoToGPUPass::convert(KernelOp kernel) {
            << maxThreads << " for the threads of a block, but got "
            << size.getInt();
   kernel->removeAttr(marks::blockSize);
-  expandRemainders(kernel);
   if (failed(checkGridLimits(kernel)) ||
       failed(checkMapping(kernel, size.getInt())))
     return failure();
   auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
-  GridBuilder builder(kernel, stage, size.getInt());
+  GridBuilder builder(kernel, stage, size.getInt(), {compacts, splitsRare});
   std::optional<ThreadMapping> pixels = findPixelMapping(kernel);
   return pixels ? builder.sharePixelsOfBins(*pixels) : builder.mapWork();
 }

@@ -23,9 +23,6 @@ namespace piko {
 /// Fails, with an error, at what no grid of blocks can do.
 llvm::LogicalResult checkGridLimits(KernelOp kernel);
 
-/// Makes integer arithmetic of remainders of floats.
-void expandRemainders(KernelOp kernel);
-
 /// Whether an operation, or one inside it, is one of those.
 template <typename Predicate>
 bool contains(mlir::Operation *op, Predicate predicate) {

@@ -29,7 +29,8 @@ constexpr RuntimeMember bucketBegin =
                         bucketEnd =
                             PIKO_RUNTIME_MEMBER(pikoir_unit, bucket_end),
                         begin = PIKO_RUNTIME_MEMBER(pikoir_unit, begin),
-                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end);
+                        end = PIKO_RUNTIME_MEMBER(pikoir_unit, end),
+                        owner = PIKO_RUNTIME_MEMBER(pikoir_unit, owner);
 constexpr RuntimeMember callBin = PIKO_RUNTIME_MEMBER(pikoir_call, bin),
                         callBegin = PIKO_RUNTIME_MEMBER(pikoir_call, begin),
                         callEnd = PIKO_RUNTIME_MEMBER(pikoir_call, end);
@@ -147,6 +148,28 @@ struct ThreadLowering : Lowering<ThreadOp> {
 
 struct TakeUnitLowering : Lowering<TakeUnitOp> {
   using Lowering::Lowering;
+
+  /// A unit, if it is there and has its home with the thread; else -1.
+  Value leaveOthers(OpBuilder &builder, Location loc, OpAdaptor adaptor,
+                    Value cursor, Value unit) const {
+    Value none = createI64(builder, loc, -1), zero = createI64(builder, loc, 0);
+    Value end = load(builder, loc, cursor, layout::lastTaken);
+    Value isThere = arith::CmpIOp::create(builder, loc,
+                                          arith::CmpIPredicate::slt, unit, end);
+    // There is a first one.
+    Value at = arith::SelectOp::create(builder, loc, isThere, unit, zero);
+    Value units = context.member(builder, adaptor.getBins(), layout::units);
+    Value owner = load(builder, loc,
+                       entry(builder, loc, units, toIndex(builder, loc, at),
+                             sizeof(pikoir_unit)),
+                       layout::owner);
+    Value thread = arith::IndexCastOp::create(
+        builder, loc, builder.getI64Type(), adaptor.getThread());
+    Value isOwn = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq,
+                                        owner, thread);
+    Value isBoth = arith::AndIOp::create(builder, loc, isThere, isOwn);
+    return arith::SelectOp::create(builder, loc, isBoth, unit, none);
+  }
   LogicalResult
   matchAndRewrite(TakeUnitOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
@@ -161,13 +184,8 @@ struct TakeUnitLowering : Lowering<TakeUnitOp> {
         rewriter, loc, LLVM::AtomicBinOp::add,
         createOffset(rewriter, loc, cursor, layout::taken.offset),
         createI64(rewriter, loc, 1), LLVM::AtomicOrdering::monotonic);
-    if (op.getThread()) {
-      Value end = load(rewriter, loc, cursor, layout::lastTaken);
-      Value isOwn = arith::CmpIOp::create(rewriter, loc,
-                                          arith::CmpIPredicate::slt, unit, end);
-      unit = arith::SelectOp::create(rewriter, loc, isOwn, unit,
-                                     createI64(rewriter, loc, -1));
-    }
+    if (op.getThread())
+      unit = leaveOthers(rewriter, loc, adaptor, cursor, unit);
     rewriter.replaceOp(op, toIndex(rewriter, loc, unit));
     return success();
   }

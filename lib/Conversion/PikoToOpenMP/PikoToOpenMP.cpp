@@ -85,47 +85,66 @@ private:
                                to->getArgument(0));
   }
 
-  /// The unit that a thread runs next, by what is known of who runs which; no
-  /// number below the count at the end.
-  Value createNext(UnitLoop kind, Value thread) {
-    if (kind == UnitLoop::Asked)
-      return NextUnitOp::create(rewriter, loc, bins);
-    Value taken = TakeUnitOp::create(rewriter, loc, bins, thread);
-    if (kind == UnitLoop::Shared)
-      return taken;
-    // Who has no more helps others, which the runtime sees to.
-    Value own = arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
-                                      taken, count);
-    return scf::IfOp::create(
-               rewriter, loc, own,
-               [&](OpBuilder &builder, Location loc) {
-                 scf::YieldOp::create(builder, loc, taken);
-               },
-               [&](OpBuilder &builder, Location loc) {
-                 scf::YieldOp::create(
-                     builder, loc,
-                     NextUnitOp::create(builder, loc, bins).getResult());
-               })
-        .getResult(0);
+  Value isUnit(Value number) {
+    return arith::CmpIOp::create(rewriter, loc, arith::CmpIPredicate::ult,
+                                 number, count);
   }
 
   /// Each thread runs one unit after the other.
   void share(UnitLoop kind) {
     auto some = scf::IfOp::create(rewriter, loc, any, /*withElse=*/false);
     rewriter.setInsertionPointToStart(some.thenBlock());
-    Value thread;
     if (kind == UnitLoop::Mapped)
-      thread = ThreadOp::create(rewriter, loc);
-    auto loop = scf::WhileOp::create(rewriter, loc,
-                                     TypeRange(rewriter.getIndexType()), {});
+      return shareMapped();
+    Type index = rewriter.getIndexType();
+    auto loop = scf::WhileOp::create(rewriter, loc, TypeRange(index), {});
     rewriter.createBlock(&loop.getBefore());
-    Value next = createNext(kind, thread);
-    Value goesOn = arith::CmpIOp::create(
-        rewriter, loc, arith::CmpIPredicate::ult, next, count);
-    scf::ConditionOp::create(rewriter, loc, goesOn, next);
-    Block *run = rewriter.createBlock(&loop.getAfter(), {},
-                                      rewriter.getIndexType(), loc);
+    Value next = kind == UnitLoop::Asked
+                     ? NextUnitOp::create(rewriter, loc, bins).getResult()
+                     : TakeUnitOp::create(rewriter, loc, bins, /*thread=*/{})
+                           .getResult();
+    // At the end -1, or the count or more.
+    scf::ConditionOp::create(rewriter, loc, isUnit(next), next);
+    Block *run = rewriter.createBlock(&loop.getAfter(), {}, index, loc);
     scf::YieldOp::create(rewriter, loc);
+    moveBody(run);
+  }
+
+  /// First those of its own, as long as there are any; then it helps others, as
+  /// the runtime says.
+  void shareMapped() {
+    Type index = rewriter.getIndexType(), truth = rewriter.getI1Type();
+    Value thread = ThreadOp::create(rewriter, loc);
+    Value yes = arith::ConstantIntOp::create(rewriter, loc, truth, 1);
+    auto loop =
+        scf::WhileOp::create(rewriter, loc, TypeRange{index, truth}, yes);
+    Block *before = rewriter.createBlock(&loop.getBefore(), {}, truth, loc);
+    auto own = scf::IfOp::create(
+        rewriter, loc, before->getArgument(0),
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(
+              builder, loc,
+              TakeUnitOp::create(builder, loc, bins, thread).getResult());
+        },
+        [&](OpBuilder &builder, Location loc) {
+          Value none = arith::ConstantIndexOp::create(builder, loc, -1);
+          scf::YieldOp::create(builder, loc, none);
+        });
+    Value isOwn = isUnit(own.getResult(0));
+    auto next = scf::IfOp::create(
+        rewriter, loc, isOwn,
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(builder, loc, own.getResult(0));
+        },
+        [&](OpBuilder &builder, Location loc) {
+          scf::YieldOp::create(
+              builder, loc, NextUnitOp::create(builder, loc, bins).getResult());
+        });
+    scf::ConditionOp::create(rewriter, loc, isUnit(next.getResult(0)),
+                             ValueRange{next.getResult(0), isOwn});
+    Block *run =
+        rewriter.createBlock(&loop.getAfter(), {}, {index, truth}, {loc, loc});
+    scf::YieldOp::create(rewriter, loc, run->getArgument(1));
     moveBody(run);
   }
 

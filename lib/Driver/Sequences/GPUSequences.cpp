@@ -30,8 +30,16 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
   }
   MapThreadsOptions mapping;
   mapping.threads = options.threads;
-  passes.nest<PipelineOp>().addPass(createMapThreads(mapping));
-  passes.nest<PipelineOp>().addPass(createConvertPikoToGPU());
+  mapping.collapses = synthesis.has("collapse-pixels");
+  mapping.groups = synthesis.has("group-updates");
+  mapping.counts = synthesis.has("share-by-count");
+  ConvertPikoToGPUOptions conversion;
+  conversion.compacts = synthesis.has("compact-work");
+  conversion.splitsRare = synthesis.has("split-rare");
+  OpPassManager &pipeline = passes.nest<PipelineOp>();
+  pipeline.addPass(createMapThreads(mapping));
+  pipeline.addPass(createExpandRemainders());
+  pipeline.addPass(createConvertPikoToGPU(conversion));
   addCleanUp(passes);
   addUnitsToLoops(passes, SynthesisOptions::none());
   // Each test that is left writes an entry of its own.

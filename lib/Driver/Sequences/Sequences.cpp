@@ -206,7 +206,7 @@ void piko::addVectorSequence(OpPassManager &passes,
     for (int level = 0; level < depth; ++level) {
       plan.inTurns = level > 0;
       pipeline.addPass(createPlanVectors(plan));
-      pipeline.addPass(createVectorize());
+      pipeline.addPass(createVectorize({/*marksTurns=*/level + 1 < depth}));
     }
     addCleanUp(passes);
   }

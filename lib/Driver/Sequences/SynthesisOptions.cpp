@@ -23,6 +23,9 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "pair-gathers", "tabulate-invariants", "unroll-and-jam",
       "unswitch-versions", "if-convert", "uplift-pixel-loops", "privatize",
       "reduce-updates", "reduce-by-atomics",
+      // of a GPU
+      "collapse-pixels", "group-updates", "share-by-count", "compact-work",
+      "split-rare",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

@@ -62,7 +62,7 @@ private:
 static bool runsOneBin(StageOp stage, OpenWriterOp writer) {
   auto units = writer->getParentOfType<scf::ForallOp>();
   auto kind = units->getAttrOfType<UnitLoopAttr>(marks::units);
-  return hasOneOrderedBin(stage) && kind && kind.getValue() == UnitLoop::Shared;
+  return hasOneOrderedBin(stage) && kind && kind.getValue() != UnitLoop::Serial;
 }
 
 PrivateImagesOp ImagePrivatizer::createImages(const Selection &selection,
@@ -187,6 +187,10 @@ void ReduceUpdatesPass::runOnUnits(KernelOp kernel, OpenWriterOp writer) {
     remark.attachNote(finder.reason->at) << finder.reason->why;
     return;
   }
+  // Threads take ascending units then: a core has none of its own.
+  auto units = writer->getParentOfType<scf::ForallOp>();
+  units->setAttr(marks::units,
+                 UnitLoopAttr::get(&getContext(), UnitLoop::Shared));
   ImagePrivatizer privatizer(getPipeline(kernel), writer);
   for (const Selection &selection : finder.selections) {
     UpdateOp first = selection.sites.front().update;

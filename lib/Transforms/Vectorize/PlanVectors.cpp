@@ -387,8 +387,12 @@ void PlanVectorsPass::runOnOperation() {
         << int64_t(laneCount);
     return signalPassFailure();
   }
-  if (!inTurns)
-    return planLoops(getOperation());
+  if (!inTurns) {
+    planLoops(getOperation());
+    getOperation().walk(
+        [](scf::ForOp loop) { loop->removeAttr(marks::barriers); });
+    return;
+  }
   SmallVector<Operation *> turns;
   getOperation().walk([&](scf::WhileOp loop) {
     if (loop->removeAttr(marks::turns))

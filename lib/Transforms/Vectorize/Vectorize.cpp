@@ -24,6 +24,7 @@ using namespace piko;
 namespace {
 
 struct VectorizePass : piko::impl::VectorizeBase<VectorizePass> {
+  using VectorizeBase::VectorizeBase;
   void runOnOperation() override;
   LogicalResult write(scf::ForOp loop, int64_t laneCount);
 };
@@ -34,6 +35,14 @@ LogicalResult VectorizePass::write(scf::ForOp loop, int64_t laneCount) {
   if (!llvm::is_contained({4, 8, 16, 32}, laneCount))
     return loop.emitError("expected a plan of 4, 8, 16 or 32 lanes, but got ")
            << laneCount;
+  WalkResult nested = loop.getBody()->walk([&](Operation *op) {
+    if (!op->hasAttr(marks::vectorLanes))
+      return WalkResult::advance();
+    op->emitError("expected no plan in a loop that is planned to be vectors");
+    return WalkResult::interrupt();
+  });
+  if (nested.wasInterrupted())
+    return failure();
   IterationLanes lanes(loop, laneCount);
   if (const IterationLanes::Refusal &refusal = lanes.getRefusal(); refusal.at) {
     InFlightDiagnostic error =
@@ -44,8 +53,9 @@ LogicalResult VectorizePass::write(scf::ForOp loop, int64_t laneCount) {
   }
   IterationWriter writer(lanes);
   writer.write(OpBuilder(loop).saveInsertionPoint());
-  for (scf::WhileOp turns : writer.getTurnLoops())
-    turns->setAttr(marks::turns, UnitAttr::get(&getContext()));
+  if (marksTurns)
+    for (scf::WhileOp turns : writer.getTurnLoops())
+      turns->setAttr(marks::turns, UnitAttr::get(&getContext()));
   loop.erase();
   return success();
 }

@@ -229,8 +229,8 @@ int64_t pikoir_team(void) { return omp_get_num_threads(); }
 
 /// Where the cursor of an owner is among all.
 static int64_t indexOf(int64_t owner) {
-  return owner == nobody      ? 0
-         : owner == firstCore ? 1
+  return owner == nobody      ? 1
+         : owner == firstCore ? 2
                               : PIKOIR_CURSOR_HOMES + owner;
 }
 
@@ -243,6 +243,7 @@ void UnitCursors::reset(const std::vector<pikoir_unit> &units, int64_t homes,
   }
   for (int64_t i = 0; i < PIKOIR_CURSOR_HOMES + homes; ++i)
     lines_[i].cursor = {};
+  lines_[0].cursor.end = static_cast<int64_t>(units.size());
   input.homes = 0;
   for (size_t unit = units.size(); unit-- > 0;) {
     pikoir_cursor &cursor = lines_[indexOf(units[unit].owner)].cursor;

@@ -113,18 +113,21 @@ typedef struct pikoir_call {
   int64_t end;
 } pikoir_call;
 
-/// How far the units of an owner have been taken: by atomic additions to
-/// `next`, which may go beyond `end`. On a cache line of its own.
+/// How far units have been taken: by atomic additions to `next`, which may go
+/// beyond `end`. On a cache line of its own.
 typedef struct pikoir_cursor {
   int64_t next;
   int64_t end; ///< After the last one.
   int64_t unused[6];
 } pikoir_cursor;
 
-/// The cursor of a core's own units, which are consecutive where a schedule
-/// maps all units: PIKOIR_CURSOR_HOMES + core. The first two are of units that
-/// any thread may run, and of those that only the first one does.
-#define PIKOIR_CURSOR_HOMES 2
+/// The first cursor is of all units, whoever is to run them: a kernel takes
+/// them by it alone, or asks pikoir_next_unit. The next ones are of units that
+/// any thread may run, and of those that only the first one does; then come
+/// those that have their home with a core, at PIKOIR_CURSOR_HOMES + core. Among
+/// [next, end) of an owner's there may be units of others, which a thread that
+/// takes one leaves to these.
+#define PIKOIR_CURSOR_HOMES 3
 
 /// A stage's input: valid until pikoir_end.
 typedef struct pikoir_input {
@@ -140,7 +143,7 @@ typedef struct pikoir_input {
   const pikoir_call *calls;
   int64_t call_count;
   int64_t clears;         ///< Tiles begin with their clear value: 0 or 1.
-  pikoir_cursor *cursors; ///< Null where there are no units.
+  pikoir_cursor *cursors; ///< Null after an error.
   int64_t homes;          ///< Cores that have units of their own.
 } pikoir_input;
 

@@ -1,5 +1,9 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32}))' --split-input-file | FileCheck %s --check-prefix=MAPPED
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32 by-count=false}))' --split-input-file | FileCheck %s --check-prefix=PLAIN
+// PLAIN-NOT: by_count
+// PLAIN:     piko.items of @a lanes iterations attributes {piko.threads = #piko<threads one>} {
+// PLAIN-NOT: by_count
 // Where a bin has many primitives, threads have some each; where it has few, threads
 // share the iterations of one after the other.
 

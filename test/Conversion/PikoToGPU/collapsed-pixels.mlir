@@ -1,5 +1,9 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=16},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s --check-prefix=FEW
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64 collapse=false}))' | FileCheck %s --check-prefix=UNSHARED
+// UNSHARED-NOT: #piko<threads collapsed>
+// UNSHARED:     piko.kernel @kernel_draw
+// UNSHARED-NOT: #piko<threads collapsed>
 
 piko.record @Box {"x" : i32 at 0, "y" : i32 at 4, "toX" : i32 at 8,
                   "toY" : i32 at 12, "edge" : i32 at 16, "step" : i32 at 20}

@@ -1,5 +1,9 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=16},convert-piko-to-gpu))' | FileCheck %s --check-prefix=FEW
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},convert-piko-to-gpu{compact=false}),cse,canonicalize)' | FileCheck %s --check-prefix=PLAIN
+// PLAIN-LABEL: piko.kernel @kernel_draw
+// PLAIN-NOT:     memref<192xi32
+// PLAIN:         piko.storage.close_bins
 
 piko.record @Box {"x" : i32 at 0, "y" : i32 at 4, "width" : i32 at 8,
                   "height" : i32 at 12} size 16 align 4

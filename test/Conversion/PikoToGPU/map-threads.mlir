@@ -1,5 +1,9 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32}))' --split-input-file --verify-diagnostics | FileCheck %s
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads))' --split-input-file 2>/dev/null | FileCheck %s --check-prefix=DEFAULT
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32 group=false}))' --split-input-file 2>/dev/null | FileCheck %s --check-prefix=PLAIN
+// PLAIN-NOT: piko.grouped
+// PLAIN:     piko.pipeline @Barriers
+// PLAIN-NOT: piko.grouped
 // Who takes what of a kernel's work. Without an option a block has the threads of its
 // stage, or more for a large bin.
 

@@ -25,6 +25,30 @@ piko.pipeline @Function rank 1 {
 
 // -----
 
+// Without piko-expand-remainders.
+piko.record @F {"x" : f32 at 0} size 4 align 4
+piko.pipeline @Remainder rank 1 {
+  piko.image @image : @F rank 1
+  piko.source @a
+  piko.stage @a bins [0] threads 8 : @F -> [] {
+    // expected-remark @below {{the threads of a block take one primitive after the other: a bin is the whole domain}}
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> f32
+      // expected-error @below {{a kernel for a GPU uses 'arith.remf', which has other bits there}}
+      %e = arith.remf %x, %x : f32
+      %zero = arith.constant 0 : index
+      piko.update @image[%zero : index] {
+      ^bb0(%old: f32):
+        piko.yield [%e : f32]
+      }
+      piko.return
+    }
+  }
+}
+
+// -----
+
 // Only the thread of a pixel knows whether an update of it passed.
 piko.record @F {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Outcome rank 1 {

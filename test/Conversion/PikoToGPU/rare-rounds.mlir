@@ -1,4 +1,11 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu{rare=false}),canonicalize,cse)' --split-input-file | FileCheck %s --check-prefix=PLAIN
+// PLAIN-LABEL: piko.pipeline @Rare
+// PLAIN-NOT:     piko.rare
+// PLAIN:         function(@Rare_kernel_start)
+// PLAIN-NOT:     function(@Rare_
+// PLAIN-NOT:     piko.rare
+// PLAIN:         piko.gpu.close_log
 
 // A way that keeps an array is rare. The first launch drops what the threads have
 // emitted in a round with such a primitive, and leaves the unit there; the second

@@ -1,4 +1,5 @@
 // RUN: piko-opt --piko-form-program --convert-piko-to-openmp --convert-piko-to-llvm --canonicalize %s | FileCheck %s
+// RUN: sed 's/units shared/units mapped/' %s | piko-opt --piko-form-program --convert-piko-to-openmp --convert-piko-to-llvm --canonicalize - | FileCheck %s --check-prefix=MAPPED
 
 // A kernel of a cycle may have next to nothing to do. Its units are calls of a
 // function, so that it has no parallel region where there is one thread.
@@ -28,6 +29,13 @@ piko.record @F {"v" : f32 at 0} size 4 align 4
 // CHECK:         } else {
 // CHECK-NEXT:      scf.for %[[I:.*]] = %c0 to %{{.*}} step %c1 {
 // CHECK-NEXT:        func.call @P.kernel_a.unit({{.*}}, %[[I]])
+
+// MAPPED-LABEL: func.func private @P.kernel_a(
+// MAPPED:         omp.parallel
+// MAPPED:           llvm.call @pikoir_thread()
+// MAPPED:           llvm.call @pikoir_next_unit
+// MAPPED:           ^bb0(%[[I:.*]]: index, %{{.*}}: i1):
+// MAPPED-NEXT:        func.call @P.kernel_a.unit({{.*}}, %[[I]])
 
 // Outside of cycles a kernel is as it was.
 // CHECK-LABEL: func.func private @P.kernel_b(

@@ -27,13 +27,18 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK:         %[[COUNT:.*]] = piko.storage.unit_count %[[BINS:.*]] :
 // CHECK:         omp.parallel
 // CHECK:           %[[THREAD:.*]] = piko.cpu.thread
-// CHECK-NEXT:      scf.while
-// CHECK-NEXT:        %[[OWN:.*]] = piko.cpu.take_unit %[[BINS]] of %[[THREAD]] :
-// CHECK-NEXT:        %[[HAS:.*]] = arith.cmpi ult, %[[OWN]], %[[COUNT]]
+// CHECK:           scf.while (%[[MORE:.*]] = %true) : (i1) -> (index, i1) {
+// CHECK-NEXT:        %[[OWN:.*]] = scf.if %[[MORE]] -> (index) {
+// CHECK-NEXT:          %[[TAKEN:.*]] = piko.cpu.take_unit %[[BINS]] of %[[THREAD]] :
+// CHECK-NEXT:          scf.yield %[[TAKEN]]
+// CHECK:             %[[HAS:.*]] = arith.cmpi ult, %[[OWN]], %[[COUNT]]
 // CHECK-NEXT:        %[[NEXT:.*]] = scf.if %[[HAS]] -> (index) {
 // CHECK-NEXT:          scf.yield %[[OWN]]
 // CHECK-NEXT:        } else {
 // CHECK-NEXT:          piko.cpu.next_unit %[[BINS]]
+// CHECK:             scf.condition(%{{.*}}) %[[NEXT]], %[[HAS]]
+// CHECK:           ^bb0(%[[UNIT:.*]]: index, %[[GOES:.*]]: i1):
+// CHECK:             scf.yield %[[GOES]]
 
 // CHECK-LABEL: piko.kernel @kernel_serial
 // CHECK-NOT:     omp.

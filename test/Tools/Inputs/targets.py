@@ -107,7 +107,9 @@ def check(path):
 
 def main():
     folder = pathlib.Path(sys.argv[1])
-    files = sorted(p for p in folder.iterdir() if p.suffix in SUFFIXES)
+    files = sorted((p for p in folder.rglob("*")
+                    if p.suffix in SUFFIXES and "Inputs" not in p.parts),
+                   key=lambda p: p.name)
     status = 0
     print(f"{'':32}", *TARGETS)
     for path in files:

@@ -42,10 +42,16 @@ using namespace piko;
 
 namespace {
 
+/// What may be left out.
+struct MappingOptions {
+  bool collapses, groups, counts;
+};
+
 class ThreadMapper {
 public:
-  ThreadMapper(KernelOp kernel, StageOp stage, int64_t threads)
-      : kernel(kernel), stage(stage), threads(threads) {}
+  ThreadMapper(KernelOp kernel, StageOp stage, int64_t threads,
+               MappingOptions options)
+      : kernel(kernel), stage(stage), threads(threads), options(options) {}
   void run();
 
 private:
@@ -64,6 +70,7 @@ private:
   KernelOp kernel;
   StageOp stage;
   int64_t threads;
+  MappingOptions options;
 };
 
 struct MapThreadsPass : piko::impl::MapThreadsBase<MapThreadsPass> {
@@ -108,7 +115,7 @@ static void upliftLoops(KernelOp kernel) {
 }
 
 std::optional<Obstacle> ThreadMapper::findObstacleToCollapsing(ItemsOp items) {
-  if (threads == 1)
+  if (threads == 1 || !options.collapses)
     return Obstacle{items.getLoc(), ""};
   PixelNestResult found = findPixelNest(items, stage);
   if (!found.nest)
@@ -181,7 +188,7 @@ ThreadMapping ThreadMapper::chooseForItems(ItemsOp work) {
   if (lanes == LaneMapping::One || threads == 1)
     return ThreadMapping::One;
   if (lanes == LaneMapping::Iterations && !hasRareIterationsOnly(work)) {
-    if (!canShareByCount(work))
+    if (!options.counts || !canShareByCount(work))
       return ThreadMapping::One;
     work->setAttr(marks::fewest,
                   Builder(work).getI64IntegerAttr(countFewest(work)));
@@ -192,7 +199,8 @@ ThreadMapping ThreadMapper::chooseForItems(ItemsOp work) {
 
 /// Where two iterations may update one pixel.
 void ThreadMapper::orderUpdates(ParallelLoopOpInterface loop) {
-  if (threads == 1 || isChecked(loop) || updatesOwnPixels(loop))
+  if (threads == 1 || !options.groups || isChecked(loop) ||
+      updatesOwnPixels(loop))
     return;
   std::optional<Obstacle> obstacle = findObstacleToGrouping(loop);
   if (!obstacle)
@@ -280,7 +288,8 @@ void MapThreadsPass::runOnOperation() {
       continue;
     auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
     ThreadMapper(kernel, stage,
-                 threads ? threads : chooseThreads(stage, kernel))
+                 threads ? threads : chooseThreads(stage, kernel),
+                 {collapses, groups, counts})
         .run();
   }
 }

@@ -330,9 +330,12 @@ void LaneForms::checkBarriers() {
   loop.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (op == loop || op->hasTrait<OpTrait::IsTerminator>())
       return WalkResult::advance();
-    if (isa<ParallelLoopOpInterface>(op) ||
-        llvm::any_of(op->getResultTypes(), llvm::IsaPred<VectorType>)) {
-      refuse(op, "iterations meet inside");
+    bool isVector =
+        llvm::any_of(op->getResultTypes(), llvm::IsaPred<VectorType>);
+    if (isa<ParallelLoopOpInterface>(op) || isVector) {
+      refuse(op, isVector ? "there are vectors inside, as iterations have that "
+                            "meet at barriers"
+                          : "iterations meet inside");
       return WalkResult::interrupt();
     }
     if (isa<scf::ForOp, scf::WhileOp>(op) && findBarrier(op))

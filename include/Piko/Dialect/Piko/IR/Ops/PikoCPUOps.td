@@ -503,6 +503,7 @@ def Piko_TakeUnitOp : Piko_CPUOp<"take_unit", [
 
     ```mlir
     %u = piko.cpu.take_unit %bins : !piko.bins<@Fragment>
+    %t = piko.cpu.thread
     %v = piko.cpu.take_unit %bins of %t : !piko.bins<@Fragment>
     ```
   }];

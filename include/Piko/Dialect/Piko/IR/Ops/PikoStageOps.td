@@ -191,9 +191,9 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     on the bin or on constants is said by a `dynamic` body, which runs for each
     bin before the pipeline does and overrides the directives.
 
-    A `resolved` schedule says all that is known of its bins. If it is
-    `serialize`, the compiler makes a sequential loop; else the runtime hands
-    out units.
+    A `resolved` schedule says all that is known of its bins, and kernels ask no
+    scheduler who runs a unit of work (`piko-pre-schedule`,
+    `piko-eliminate-schedules`).
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4

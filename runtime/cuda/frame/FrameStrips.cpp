@@ -8,7 +8,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "cuda/Frame.h"
+#include "cuda/frame/Frame.h"
 
 using namespace piko::cuda;
 using namespace piko::rt;

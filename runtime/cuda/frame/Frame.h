@@ -15,7 +15,7 @@
 #ifndef PIKO_RUNTIME_CUDA_FRAME_H
 #define PIKO_RUNTIME_CUDA_FRAME_H
 
-#include "cuda/FrameDescription.h"
+#include "cuda/frame/FrameDescription.h"
 
 #include <string>
 

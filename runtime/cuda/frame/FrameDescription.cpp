@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- FrameDescription.cpp - What the device is told of a frame ----------===//
 
-#include "cuda/FrameDescription.h"
+#include "cuda/frame/FrameDescription.h"
 #include "cuda/Accelerator.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Frame.cpp - A pipeline's frame as one submission -------------------===//
 
-#include "cuda/Frame.h"
+#include "cuda/frame/Frame.h"
 #include "cuda/Accelerator.h"
 
 #include <algorithm>

@@ -19,7 +19,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "cuda/Frame.h"
+#include "cuda/frame/Frame.h"
 
 #include <algorithm>
 
