@@ -5,7 +5,7 @@
 // a body: the front end finds their calls in the LLVM IR of a pipeline and
 // turns them into operations of the piko dialect. They are found by their
 // declarations, so that names and template arguments, not mangled text, say
-// what a call means (lib/Frontend/Markers.cpp lists them all).
+// what a call means (lib/Frontend/Support/Markers.cpp lists them all).
 //
 // A marker that takes or returns a pointer to a record is a template over the
 // record's type, whose layout the front end knows from Clang.
