@@ -7,7 +7,8 @@ licence   every source file has the licence line at its top
 paths     no file holds an absolute path of somebody's machine
 layers    the runtime's common part knows nothing of the targets' parts, nor the
           CPU's of CUDA's; no library includes a file of another one by its path
-folders   none of those by level has more files than a reader looks through
+folders   none has more files than a reader looks through
+classes   none has more functions than that
 words     terms are the field's: none of those of utils/words.txt
 tidy      clang-tidy over the compile commands of a build (--build DIR), or over
           the files without headers of LLVM, a folder at a time (--quick)
@@ -162,6 +163,47 @@ def folders():
     return faults
 
 
+MOST_METHODS = 40
+# What a user's stage inherits: the language.
+LANGUAGE = ("BasicStage",)
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
+CLASS = re.compile(r"\b(?:class|struct)\s+(?:alignas\(\w+\)\s+)?(\w+)(?:\s+final)?"
+                   r"\s*(?::[^;{()]*)?\{")
+
+
+def declarations(text):
+    """What a class declares, without bodies and what is nested: `text` begins after
+    its brace."""
+    depth, flat = 1, ""
+    for char in text:
+        depth += (char == "{") - (char == "}")
+        if depth == 0:
+            break
+        if depth == 1:
+            flat += ";" if char == "}" else char
+    return re.sub(r"\b(?:public|private|protected):", "", flat).split(";")
+
+
+def classes():
+    """A class declares MOST_METHODS functions, constructors aside."""
+    faults = 0
+    for name in sources():
+        if not re.match(r"(lib|include|runtime|tools|test-driver)/.*\.(h|hpp|cpp)$", name):
+            continue
+        text = COMMENT.sub("", (ROOT / name).read_text())
+        for found in CLASS.finditer(text):
+            methods = 0
+            for one in declarations(text[found.end():]):
+                head = re.match(r"([^=]*?)\b(~?\w+|operator\W+)\s*\(", one)
+                methods += bool(head and head[1].strip() and head[2].strip("~") != found[1]
+                                and not re.search(r"\b(using|friend|typedef)\b", head[1]))
+            if methods > MOST_METHODS and found[1] not in LANGUAGE:
+                print(f"{name}: expected at most {MOST_METHODS} functions in"
+                      f" '{found[1]}', but it has {methods}")
+                faults += 1
+    return faults
+
+
 WORDS = "utils/words.txt"
 # Comments go from line to line.
 JOINED = re.compile(r"\s*\n\s*(?://+<?|#+|\*)?\s*")
@@ -303,8 +345,8 @@ def main():
     )
     parser.add_argument(
         "check",
-        choices=["format", "licence", "paths", "layers", "folders", "words", "tidy",
-                 "all"],
+        choices=["format", "licence", "paths", "layers", "folders", "classes",
+                 "words", "tidy", "all"],
     )
     parser.add_argument("--fix", action="store_true")
     parser.add_argument("--build", default="build")
@@ -317,12 +359,13 @@ def main():
         "paths": paths,
         "layers": layers,
         "folders": folders,
+        "classes": classes,
         "words": words,
         "tidy": lambda: (tidy_quick if args.quick else tidy)(args.build, args.jobs),
     }
     names = [args.check]
     if args.check == "all":
-        names = ["format", "licence", "paths", "layers", "folders", "words"]
+        names = ["format", "licence", "paths", "layers", "folders", "classes", "words"]
     faults = [name for name in names if checks[name]()]
     sys.exit(1 if faults else 0)
 

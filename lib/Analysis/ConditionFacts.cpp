@@ -21,21 +21,21 @@ static LinearFact combine(bool both, LinearFact a, LinearFact b) {
   return either;
 }
 
-LinearFact LinearFacts::describeUnknown(Value condition, bool truth,
-                                        unsigned frame) {
-  auto [found, isNew] = truths.try_emplace(number(condition, frame));
+LinearFact ConditionFacts::describeUnknown(Value condition, bool truth,
+                                           unsigned frame) {
+  auto [found, isNew] = truths.try_emplace(core.number(condition, frame));
   if (isNew) {
-    found->second = system.addVariable();
-    system.getFacts().addBetween(Linear(0), found->second, Linear(1));
+    found->second = core.system.addVariable();
+    core.system.getFacts().addBetween(Linear(0), found->second, Linear(1));
   }
   LinearFact fact;
   fact.addZero(found->second - Linear(truth ? 1 : 0));
   return fact;
 }
 
-LinearFact LinearFacts::describeChoice(Value condition, Value ifTrue,
-                                       Value ifFalse, bool truth,
-                                       unsigned frame) {
+LinearFact ConditionFacts::describeChoice(Value condition, Value ifTrue,
+                                          Value ifFalse, bool truth,
+                                          unsigned frame) {
   LinearFact either;
   std::vector<LinearFact> cases;
   for (bool chosen : {true, false}) {
@@ -43,9 +43,9 @@ LinearFact LinearFacts::describeChoice(Value condition, Value ifTrue,
     if (Value value = chosen ? ifTrue : ifFalse) {
       // What holds of what an arm computes holds only if it runs.
       LinearFact computed;
-      LinearFact *outer = std::exchange(facts, &computed);
+      LinearFact *outer = std::exchange(core.facts, &computed);
       LinearFact said = describe(value, truth, frame);
-      facts = outer;
+      core.facts = outer;
       fact.add(std::move(computed));
       fact.add(std::move(said));
     }
@@ -55,8 +55,8 @@ LinearFact LinearFacts::describeChoice(Value condition, Value ifTrue,
   return either;
 }
 
-std::optional<LinearFact> LinearFacts::describeFlow(Value condition, bool truth,
-                                                    unsigned frame) {
+std::optional<LinearFact>
+ConditionFacts::describeFlow(Value condition, bool truth, unsigned frame) {
   if (auto argument = dyn_cast<BlockArgument>(condition)) {
     auto loop = dyn_cast<scf::WhileOp>(argument.getOwner()->getParentOp());
     if (!loop || argument.getOwner() != loop.getAfterBody())
@@ -71,21 +71,21 @@ std::optional<LinearFact> LinearFacts::describeFlow(Value condition, bool truth,
       return value.getDefiningOp<ub::PoisonOp>() ? Value() : value;
     };
     for (scf::YieldOp yield : {choice.thenYield(), choice.elseYield()})
-      expandAhead(choice, yield.getOperand(result), frame);
+      core.expandAhead(choice, yield.getOperand(result), frame);
     return describeChoice(choice.getCondition(), known(choice.thenYield()),
                           known(choice.elseYield()), truth, frame);
   }
   if (auto loop = condition.getDefiningOp<scf::WhileOp>()) {
     // As it was when the loop ended.
     scf::ConditionOp end = loop.getConditionOp();
-    assume(end.getCondition(), false, frame);
+    core.assume(end.getCondition(), false, frame);
     return describe(end.getArgs()[result], truth, frame);
   }
   return std::nullopt;
 }
 
-LinearFact LinearFacts::describeEqual(Value a, Value b, bool isEqual,
-                                      unsigned frame) {
+LinearFact ConditionFacts::describeEqual(Value a, Value b, bool isEqual,
+                                         unsigned frame) {
   auto both = [&](bool first) {
     return combine(true, describe(a, first, frame),
                    describe(b, first == isEqual, frame));
@@ -93,7 +93,8 @@ LinearFact LinearFacts::describeEqual(Value a, Value b, bool isEqual,
   return combine(false, both(true), both(false));
 }
 
-LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
+LinearFact ConditionFacts::describe(Value condition, bool truth,
+                                    unsigned frame) {
   if (APInt constant; matchPattern(condition, m_ConstantInt(&constant))) {
     LinearFact fact;
     if (constant.isOne() != truth)
@@ -113,8 +114,9 @@ LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
     return describeEqual(op->getOperand(0), op->getOperand(1), !truth, frame);
   if (auto low = dyn_cast_or_null<arith::TruncIOp>(op)) {
     // A bool in memory is 0 or 1.
-    Linear byte = get(low.getIn(), frame);
-    if (!isSurelyAtLeastZero(byte) || !isSurelyAtLeastZero(Linear(1) - byte))
+    Linear byte = core.get(low.getIn(), frame);
+    if (!core.isSurelyAtLeastZero(byte) ||
+        !core.isSurelyAtLeastZero(Linear(1) - byte))
       return describeUnknown(condition, truth, frame);
     LinearFact fact;
     fact.addZero(byte - Linear(truth ? 1 : 0));
@@ -127,13 +129,13 @@ LinearFact LinearFacts::describe(Value condition, bool truth, unsigned frame) {
   if (auto compare = dyn_cast_or_null<arith::CmpIOp>(op))
     return describeInteger(compare, truth, frame);
   if (auto compare = dyn_cast_or_null<arith::CmpFOp>(op))
-    return describeFloat(compare, truth, frame);
+    return core.floats.describeFloat(compare, truth, frame);
   if (std::optional<LinearFact> fact = describeFlow(condition, truth, frame))
     return *fact;
   return describeUnknown(condition, truth, frame);
 }
 
-BinAtOp LinearFacts::getComparedCell(arith::CmpIOp compare, unsigned frame) {
+BinAtOp ConditionFacts::getComparedCell(arith::CmpIOp compare, unsigned frame) {
   // The number of a bin may not fit in fewer bits.
   auto strip = [](Value value) {
     auto isWide = [](Type type) {
@@ -147,9 +149,9 @@ BinAtOp LinearFacts::getComparedCell(arith::CmpIOp compare, unsigned frame) {
     return value;
   };
   Value a = strip(compare.getLhs()), b = strip(compare.getRhs());
-  if (isOwnBin(a, frame))
+  if (core.bin.isOwnBin(a, frame))
     std::swap(a, b);
-  return isOwnBin(b, frame) ? a.getDefiningOp<BinAtOp>() : BinAtOp();
+  return core.bin.isOwnBin(b, frame) ? a.getDefiningOp<BinAtOp>() : BinAtOp();
 }
 
 /// That `a < b`, or that it is not, as unsigned numbers.
@@ -166,8 +168,8 @@ static LinearFact describeBelow(const Linear &a, const Linear &b, bool truth) {
   return fact;
 }
 
-LinearFact LinearFacts::describeInteger(arith::CmpIOp compare, bool truth,
-                                        unsigned frame) {
+LinearFact ConditionFacts::describeInteger(arith::CmpIOp compare, bool truth,
+                                           unsigned frame) {
   Predicate predicate = compare.getPredicate();
   bool isEqual = (predicate == Predicate::eq) == truth;
   if (compare.getLhs().getType().isInteger(1))
@@ -177,9 +179,10 @@ LinearFact LinearFacts::describeInteger(arith::CmpIOp compare, bool truth,
                : describeUnknown(compare, truth, frame);
   if (predicate == Predicate::eq || predicate == Predicate::ne)
     if (BinAtOp cell = getComparedCell(compare, frame))
-      return isEqual ? describeInBin(cell, frame)
+      return isEqual ? core.bin.describeInBin(cell, frame)
                      : describeUnknown(compare, truth, frame);
-  Linear a = get(compare.getLhs(), frame), b = get(compare.getRhs(), frame);
+  Linear a = core.get(compare.getLhs(), frame),
+         b = core.get(compare.getRhs(), frame);
   LinearFact fact;
   switch (predicate) {
   case Predicate::eq:
@@ -213,8 +216,8 @@ LinearFact LinearFacts::describeInteger(arith::CmpIOp compare, bool truth,
     bool isLess =
         (predicate == Predicate::ult || predicate == Predicate::ugt) == truth;
     // As unsigned numbers they are what they are as signed ones, or more.
-    return isSurelyAtLeastZero(b) ? describeBelow(a, b, isLess)
-                                  : describeUnknown(compare, truth, frame);
+    return core.isSurelyAtLeastZero(b) ? describeBelow(a, b, isLess)
+                                       : describeUnknown(compare, truth, frame);
   }
   }
   llvm_unreachable("all predicates are listed");

@@ -48,11 +48,11 @@ static std::optional<int64_t> getScaled(Value value) {
   return int64_t(scaled);
 }
 
-std::optional<LinearFacts::Exact> LinearFacts::fitExact(Exact number,
-                                                        Type type) {
+std::optional<FloatFacts::Exact> FloatFacts::fitExact(Exact number, Type type) {
   Linear most = Linear(1) * powerOfTwo(std::min(getPrecision(type), 60));
-  if (number.shift > maxShift || !isSurelyAtLeastZero(number.scaled + most) ||
-      !isSurelyAtLeastZero(most - number.scaled))
+  if (number.shift > maxShift ||
+      !core.isSurelyAtLeastZero(number.scaled + most) ||
+      !core.isSurelyAtLeastZero(most - number.scaled))
     return std::nullopt;
   return number;
 }
@@ -77,7 +77,7 @@ static std::optional<Exact> multiply(const Exact &a, const Exact &b) {
   return std::nullopt;
 }
 
-std::optional<LinearFacts::Exact> LinearFacts::getExact(Id id) {
+std::optional<FloatFacts::Exact> FloatFacts::getExact(Id id) {
   if (auto found = exacts.find(id); found != exacts.end())
     return found->second;
   std::optional<Exact> exact = findExact(id);
@@ -85,8 +85,8 @@ std::optional<LinearFacts::Exact> LinearFacts::getExact(Id id) {
   return exact;
 }
 
-std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
-  auto [value, frame] = values[id];
+std::optional<FloatFacts::Exact> FloatFacts::findExact(Id id) {
+  auto [value, frame] = core.values[id];
   if (std::optional<int64_t> scaled = getScaled(value)) {
     int shift = maxShift;
     for (; shift > 0 && *scaled % 2 == 0; --shift)
@@ -97,14 +97,14 @@ std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
   if (!op)
     return std::nullopt;
   auto exactOf = [&, frame = frame](unsigned operand) {
-    return getExact(number(op->getOperand(operand), frame));
+    return getExact(core.number(op->getOperand(operand), frame));
   };
   Type type = value.getType();
   if (isa<arith::SIToFPOp, arith::UIToFPOp>(op)) {
     if (op->getOperand(0).getType().isInteger(1))
       return std::nullopt;
-    Linear integer = get(op->getOperand(0), frame);
-    if (isa<arith::UIToFPOp>(op) && !isSurelyAtLeastZero(integer))
+    Linear integer = core.get(op->getOperand(0), frame);
+    if (isa<arith::UIToFPOp>(op) && !core.isSurelyAtLeastZero(integer))
       return std::nullopt;
     return fitExact({integer, 0}, type);
   }
@@ -136,22 +136,23 @@ std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
     std::optional<Exact> a = exactOf(0);
     if (!a || a->shift == 0)
       return a;
-    return Exact{divide(a->scaled, powerOfTwo(a->shift)), 0};
+    return Exact{core.divide(a->scaled, powerOfTwo(a->shift)), 0};
   }
   if (auto select = dyn_cast<arith::SelectOp>(op)) {
     std::optional<Exact> a = exactOf(1), b = exactOf(2);
     if (!a || !b)
       return std::nullopt;
     int shift = std::max(a->shift, b->shift);
-    Linear result = system.addVariable();
+    Linear result = core.system.addVariable();
     std::vector<LinearFact> cases;
     for (const auto &[truth, arm] :
          {std::pair(true, *a), std::pair(false, *b)}) {
-      LinearFact fact = describe(select.getCondition(), truth, frame);
+      LinearFact fact =
+          core.conditions.describe(select.getCondition(), truth, frame);
       fact.addZero(result - arm.scaled * powerOfTwo(shift - arm.shift));
       cases.push_back(std::move(fact));
     }
-    facts->choices.push_back(std::move(cases));
+    core.facts->choices.push_back(std::move(cases));
     return Exact{result, shift};
   }
   return std::nullopt;
@@ -161,38 +162,40 @@ std::optional<LinearFacts::Exact> LinearFacts::findExact(Id id) {
 // Opaque floats
 //===----------------------------------------------------------------------===//
 
-LinearFacts::Opaque LinearFacts::getOpaque(Id id) {
+FloatFacts::Opaque FloatFacts::getOpaque(Id id) {
   if (auto found = opaques.find(id); found != opaques.end())
     return found->second;
-  auto [value, frame] = values[id];
+  auto [value, frame] = core.values[id];
   Opaque opaque;
   if (auto floor = value.getDefiningOp<math::FloorOp>()) {
-    opaque = getOpaque(number(floor.getOperand(), frame));
+    opaque = getOpaque(core.number(floor.getOperand(), frame));
     opaque.isWhole = true;
   } else {
-    opaque = {system.addVariable(), system.addVariable(), false};
-    facts->addBetween(Linear(0), opaque.isNaN, Linear(1));
+    opaque = {core.system.addVariable(), core.system.addVariable(), false};
+    core.facts->addBetween(Linear(0), opaque.isNaN, Linear(1));
     auto get = value.getDefiningOp<GetOp>();
-    if (get && get.getElements().empty() && isItem(get.getPrim(), frame))
-      for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
-        if (provider.isFieldInBin(stage, get.getField(), dim)) {
-          auto [low, high] = getBin(dim);
-          facts->addBetween(low, opaque.floor, high - Linear(1));
-          facts->addZero(opaque.isNaN);
+    if (get && get.getElements().empty() &&
+        core.bin.isItem(get.getPrim(), frame))
+      for (int64_t dim = 0, e = core.stage.getBins().size(); dim < e; ++dim)
+        if (core.provider.isFieldInBin(core.stage, get.getField(), dim)) {
+          auto [low, high] = core.bin.getBin(dim);
+          core.facts->addBetween(low, opaque.floor, high - Linear(1));
+          core.facts->addZero(opaque.isNaN);
         }
   }
   opaques[id] = opaque;
   return opaque;
 }
 
-Linear LinearFacts::getCell(Value coordinate, unsigned frame,
-                            std::optional<Linear> &unknown) {
+Linear FloatFacts::getCell(Value coordinate, unsigned frame,
+                           std::optional<Linear> &unknown) {
   if (!isa<FloatType>(coordinate.getType()))
-    return get(coordinate, frame);
-  Id id = number(coordinate, frame);
+    return core.get(coordinate, frame);
+  Id id = core.number(coordinate, frame);
   if (std::optional<Exact> exact = getExact(id))
-    return exact->shift == 0 ? exact->scaled
-                             : divide(exact->scaled, powerOfTwo(exact->shift));
+    return exact->shift == 0
+               ? exact->scaled
+               : core.divide(exact->scaled, powerOfTwo(exact->shift));
   Opaque opaque = getOpaque(id);
   unknown = opaque.isNaN;
   return opaque.floor;
@@ -200,13 +203,14 @@ Linear LinearFacts::getCell(Value coordinate, unsigned frame,
 
 /// A cast truncates towards 0. Of what is out of the type's range nothing is
 /// said.
-Linear LinearFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
+Linear FloatFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
   Value operand = op->getOperand(0);
-  if (!isa<FloatType>(operand.getType()) || valueOf(id).getType().isInteger(1))
-    return atom(id);
-  Id from = number(operand, frame);
-  Linear result = atom(id);
-  Type type = valueOf(id).getType();
+  if (!isa<FloatType>(operand.getType()) ||
+      core.valueOf(id).getType().isInteger(1))
+    return core.atom(id);
+  Id from = core.number(operand, frame);
+  Linear result = core.atom(id);
+  Type type = core.valueOf(id).getType();
   unsigned width = type.isIndex() ? 64 : type.getIntOrFloatBitWidth();
   Linear end = Linear(1) * powerOfTwo(std::min(width - 1, 62u));
   LinearFact below, inside, above, nan;
@@ -214,8 +218,9 @@ Linear LinearFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
   bool isWhole, isExact = false;
   if (std::optional<Exact> exact = getExact(from)) {
     isExact = true;
-    floor = exact->shift == 0 ? exact->scaled
-                              : divide(exact->scaled, powerOfTwo(exact->shift));
+    floor = exact->shift == 0
+                ? exact->scaled
+                : core.divide(exact->scaled, powerOfTwo(exact->shift));
     isWhole = exact->shift == 0;
     nan.addContradiction();
   } else {
@@ -228,14 +233,14 @@ Linear LinearFacts::expandFloatCast(Operation *op, unsigned frame, Id id) {
   // With a fraction, and without a sign, it is the floor only from 0 on.
   Linear least =
       isWhole && isa<arith::FPToSIOp>(op) ? Linear(0) - end : Linear(0);
-  if (isExact && isSurelyAtLeastZero(floor - least) &&
-      isSurelyAtLeastZero(end - Linear(1) - floor))
+  if (isExact && core.isSurelyAtLeastZero(floor - least) &&
+      core.isSurelyAtLeastZero(end - Linear(1) - floor))
     return floor;
   below.addAtLeastZero(least - floor - Linear(1));
   inside.addAtLeastZero(floor - least);
   inside.addZero(result - floor);
   above.addAtLeastZero(floor - end);
-  facts->choices.push_back({inside, below, above, nan});
+  core.facts->choices.push_back({inside, below, above, nan});
   return result;
 }
 
@@ -356,13 +361,13 @@ static LinearFact compareFloor(Relation relation, const Linear &floor,
   return LinearFact(); // something else than a whole number
 }
 
-std::optional<bool> LinearFacts::decide(Value condition, unsigned frame) {
+std::optional<bool> FloatFacts::decide(Value condition, unsigned frame) {
   using P = arith::CmpFPredicate;
   auto compare = condition.getDefiningOp<arith::CmpFOp>();
   if (!compare)
     return std::nullopt;
-  std::optional<Exact> a = getExact(number(compare.getLhs(), frame)),
-                       b = getExact(number(compare.getRhs(), frame));
+  std::optional<Exact> a = getExact(core.number(compare.getLhs(), frame)),
+                       b = getExact(core.number(compare.getRhs(), frame));
   if (!a || !b)
     return std::nullopt;
   P predicate = compare.getPredicate();
@@ -381,19 +386,19 @@ std::optional<bool> LinearFacts::decide(Value condition, unsigned frame) {
     above = Linear(0) - above;
   bool isStrict =
       relation->first == Relation::lt || relation->first == Relation::gt;
-  if (isSurelyAtLeastZero(above - Linear(isStrict)))
+  if (core.isSurelyAtLeastZero(above - Linear(isStrict)))
     return true;
-  if (isSurelyAtLeastZero(Linear(isStrict ? 0 : -1) - above))
+  if (core.isSurelyAtLeastZero(Linear(isStrict ? 0 : -1) - above))
     return false;
   return std::nullopt;
 }
 
-LinearFact LinearFacts::describeFloat(arith::CmpFOp compare, bool truth,
-                                      unsigned frame) {
+LinearFact FloatFacts::describeFloat(arith::CmpFOp compare, bool truth,
+                                     unsigned frame) {
   using P = arith::CmpFPredicate;
   P predicate = compare.getPredicate();
-  Id left = number(compare.getLhs(), frame);
-  Id right = number(compare.getRhs(), frame);
+  Id left = core.number(compare.getLhs(), frame);
+  Id right = core.number(compare.getRhs(), frame);
   std::optional<Exact> a = getExact(left), b = getExact(right);
   LinearFact fact;
   if (predicate == P::UNO || predicate == P::ORD) {
@@ -406,7 +411,7 @@ LinearFact LinearFacts::describeFloat(arith::CmpFOp compare, bool truth,
   }
   auto relation = getRelation(predicate);
   if (!relation)
-    return describeUnknown(compare, truth, frame);
+    return core.conditions.describeUnknown(compare, truth, frame);
   Relation holds = truth ? relation->first : opposite(relation->first);
   bool holdsOfNaN = relation->second == truth;
   if (a && b) {
@@ -420,7 +425,7 @@ LinearFact LinearFacts::describeFloat(arith::CmpFOp compare, bool truth,
     holds = swap(holds);
   }
   if (a || !b || b->shift != 0)
-    return describeUnknown(compare, truth, frame);
+    return core.conditions.describeUnknown(compare, truth, frame);
   Opaque opaque = getOpaque(left);
   fact = compareFloor(holds, opaque.floor, b->scaled, opaque.isWhole);
   fact.addZero(opaque.isNaN);

@@ -35,13 +35,13 @@ LinearFacts::LinearFacts(Operation *at, FactsProvider &provider,
   auto process = at->getParentOfType<ProcessOp>();
   if (process && !stage.getTakesList()) {
     items.push_back(process.getBody().getArgument(0));
-    assumeAssigned(items.front());
+    bin.assumeAssigned(items.front());
   }
   assumeReached(at);
   if (process && stage.getTakesList()) {
-    findItems();
+    bin.findItems();
     for (Value item : items)
-      assumeAssigned(item);
+      bin.assumeAssigned(item);
   }
 }
 
@@ -73,7 +73,7 @@ void LinearFacts::assumeReached(Operation *place, unsigned frame) {
 }
 
 void LinearFacts::assume(Value condition, bool truth, unsigned frame) {
-  facts->add(describe(condition, truth, frame));
+  facts->add(conditions.describe(condition, truth, frame));
 }
 
 //===----------------------------------------------------------------------===//
@@ -340,8 +340,8 @@ Linear LinearFacts::expandOperation(Operation *op, unsigned frame, Id id) {
         Value narrow = op->getOperand(0);
         if (narrow.getType().isInteger(1)) {
           Linear value = atom(narrow.getType());
-          LinearFact yes = describe(narrow, true, frame);
-          LinearFact no = describe(narrow, false, frame);
+          LinearFact yes = conditions.describe(narrow, true, frame);
+          LinearFact no = conditions.describe(narrow, false, frame);
           yes.addZero(value - Linear(1));
           no.addZero(value);
           facts->choices.push_back({yes, no});
@@ -358,19 +358,19 @@ Linear LinearFacts::expandOperation(Operation *op, unsigned frame, Id id) {
         return result;
       })
       .Case<arith::FPToSIOp, arith::FPToUIOp>(
-          [&](auto) { return expandFloatCast(op, frame, id); })
+          [&](auto) { return floats.expandFloatCast(op, frame, id); })
       .Case<BinLoOp, BinHiOp>([&](auto bound) {
-        if (isOwnBin(bound.getBin(), frame)) {
-          auto [low, high] = getBin(bound.getDim());
+        if (bin.isOwnBin(bound.getBin(), frame)) {
+          auto [low, high] = bin.getBin(bound.getDim());
           return isa<BinLoOp>(op) ? low : high;
         }
         return atom(id); // of what may be no bin
       })
-      .Case([&](DomainOp domain) { return getDomain(domain.getDim()); })
+      .Case([&](DomainOp domain) { return bin.getDomain(domain.getDim()); })
       .Case([&](ExtentOp extent) {
-        return getExtent(extent.getState(), extent.getDim());
+        return bin.getExtent(extent.getState(), extent.getDim());
       })
-      .Case([&](ListSizeOp size) { return getListSize(size.getList()); })
+      .Case([&](ListSizeOp size) { return bin.getListSize(size.getList()); })
       .Case([&](GetOp get) { return expandField(get, frame, id); })
       .Case([&](scf::IfOp choice) {
         return expandBranch(
@@ -511,7 +511,7 @@ Linear LinearFacts::expandSelect(arith::SelectOp select, unsigned frame,
   if (!select.getCondition().getType().isInteger(1))
     return atom(id);
   // A case less, where conversions test what is exact.
-  if (std::optional<bool> truth = decide(select.getCondition(), frame))
+  if (std::optional<bool> truth = floats.decide(select.getCondition(), frame))
     return get(*truth ? select.getTrueValue() : select.getFalseValue(), frame);
   return chooseBetween(select.getCondition(), select.getTrueValue(),
                        select.getFalseValue(), frame, id);
@@ -522,7 +522,7 @@ Linear LinearFacts::chooseBetween(Value condition, Value ifTrue, Value ifFalse,
   Linear result = atom(id);
   std::vector<LinearFact> cases;
   for (bool truth : {true, false}) {
-    LinearFact fact = describe(condition, truth, frame);
+    LinearFact fact = conditions.describe(condition, truth, frame);
     if (Value value = truth ? ifTrue : ifFalse) {
       LinearFact *outer = std::exchange(facts, &fact);
       Linear chosen = get(value, frame);
@@ -569,10 +569,10 @@ void LinearFacts::expandAhead(scf::IfOp branch, Value value, unsigned frame) {
 
 Linear LinearFacts::expandField(GetOp get, unsigned frame, Id id) {
   Linear value = atom(id);
-  if (get.getElements().empty() && isItem(get.getPrim(), frame))
+  if (get.getElements().empty() && bin.isItem(get.getPrim(), frame))
     for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
       if (provider.isFieldInBin(stage, get.getField(), dim)) {
-        auto [low, high] = getBin(dim);
+        auto [low, high] = bin.getBin(dim);
         facts->addBetween(low, value, high - Linear(1));
       }
   return value;

@@ -48,6 +48,108 @@ public:
   llvm::DenseMap<mlir::Value, Recurrence> recurrences;
 };
 
+class LinearFacts;
+
+/// Of LinearFacts: domains, extents, and the bin that is processed.
+class BinFacts {
+public:
+  explicit BinFacts(LinearFacts &core) : core(core) {}
+
+  Linear getDomain(int64_t dim);
+  Linear getExtent(llvm::StringRef state, int64_t dim);
+  Linear getListSize(mlir::Value list);
+  std::pair<Linear, Linear> getBin(int64_t dim);
+  bool isAboveBin(mlir::Value coordinate, int64_t dim, unsigned frame);
+  bool isBelowBin(mlir::Value coordinate, int64_t dim, unsigned frame);
+  bool isOwnBin(mlir::Value bin, unsigned frame);
+  /// Whether a value is a primitive of the bin that is processed.
+  bool isItem(mlir::Value prim, unsigned frame);
+  void findItems();
+  /// Adds that the bin that is processed is one that the stage's own assign
+  /// phase chose for a primitive.
+  void assumeAssigned(mlir::Value item);
+  LinearFact describeInBin(BinAtOp cell, unsigned frame);
+
+private:
+  /// Whether a list is read at an index that it has.
+  bool isInside(ListAtOp read);
+  /// Whether no call gets an empty list.
+  bool isNeverEmpty(mlir::Value list);
+  Linear addSize();
+  /// That the bin that is processed has cells of a closed box.
+  LinearFact describeTouched(AssignBoxOp box, unsigned frame);
+
+  LinearFacts &core;
+  std::map<int64_t, Linear> domains;
+  std::map<int64_t, std::pair<Linear, Linear>> bins;
+  std::map<std::pair<std::string, int64_t>, Linear> extents;
+};
+
+/// Of LinearFacts: floats that are whole numbers, or whose floor is known.
+class FloatFacts {
+public:
+  explicit FloatFacts(LinearFacts &core) : core(core) {}
+
+  Linear expandFloatCast(mlir::Operation *op, unsigned frame, unsigned id);
+  /// The floor of a coordinate; adds to `unknown` what must be 0 for it.
+  Linear getCell(mlir::Value coordinate, unsigned frame,
+                 std::optional<Linear> &unknown);
+  LinearFact describeFloat(mlir::arith::CmpFOp compare, bool truth,
+                           unsigned frame);
+  /// What a comparison of exact floats surely gives, found out on the way.
+  std::optional<bool> decide(mlir::Value condition, unsigned frame);
+
+private:
+  /// A float that is a multiple of 2^-shift.
+  struct Exact {
+    Linear scaled;
+    int shift;
+  };
+  /// A float of which only the floor is known, and whether it is NaN.
+  struct Opaque {
+    Linear floor, isNaN;
+    bool isWhole;
+  };
+  using Id = unsigned;
+  std::optional<Exact> getExact(Id id);
+  std::optional<Exact> findExact(Id id);
+  Opaque getOpaque(Id id);
+  std::optional<Exact> fitExact(Exact number, mlir::Type type);
+
+  LinearFacts &core;
+  std::map<Id, std::optional<Exact>> exacts;
+  std::map<Id, Opaque> opaques;
+};
+
+/// Of LinearFacts: what a condition says.
+class ConditionFacts {
+public:
+  explicit ConditionFacts(LinearFacts &core) : core(core) {}
+
+  LinearFact describe(mlir::Value condition, bool truth, unsigned frame);
+  LinearFact describeUnknown(mlir::Value condition, bool truth, unsigned frame);
+
+private:
+  LinearFact describeInteger(mlir::arith::CmpIOp compare, bool truth,
+                             unsigned frame);
+  /// What a truth value says that is one of two, of which null is unknown.
+  LinearFact describeChoice(mlir::Value condition, mlir::Value ifTrue,
+                            mlir::Value ifFalse, bool truth, unsigned frame);
+  /// What one says that control flow gives.
+  std::optional<LinearFact> describeFlow(mlir::Value condition, bool truth,
+                                         unsigned frame);
+  /// That two truth values are equal, or not.
+  LinearFact describeEqual(mlir::Value a, mlir::Value b, bool isEqual,
+                           unsigned frame);
+  /// Whether a comparison for equality is that of a cell's bin with the bin
+  /// that is processed; the cell's coordinates.
+  BinAtOp getComparedCell(mlir::arith::CmpIOp compare, unsigned frame);
+
+  LinearFacts &core;
+  /// Of conditions that say nothing else.
+  llvm::DenseMap<unsigned, Linear> truths;
+};
+
 /// What is known at a place of a phase.
 class LinearFacts {
 public:
@@ -78,33 +180,34 @@ public:
               unsigned frameOfB) {
     return number(a, frameOfA) == number(b, frameOfB);
   }
-  Linear getExtent(llvm::StringRef state, int64_t dim);
-  Linear getListSize(mlir::Value list);
+  Linear getExtent(llvm::StringRef state, int64_t dim) {
+    return bin.getExtent(state, dim);
+  }
+  Linear getListSize(mlir::Value list) { return bin.getListSize(list); }
   bool isAtLeastZero(const Linear &value) {
     return system.isAtLeastZero(value, /*effort=*/40);
   }
   /// Whether a coordinate, an integer or a float, is not below the bin that is
   /// processed, or not above it.
-  bool isAboveBin(mlir::Value coordinate, int64_t dim, unsigned frame = 0);
-  bool isBelowBin(mlir::Value coordinate, int64_t dim, unsigned frame = 0);
+  bool isAboveBin(mlir::Value coordinate, int64_t dim, unsigned frame = 0) {
+    return bin.isAboveBin(coordinate, dim, frame);
+  }
+  bool isBelowBin(mlir::Value coordinate, int64_t dim, unsigned frame = 0) {
+    return bin.isBelowBin(coordinate, dim, frame);
+  }
   /// The bounds of the bin that is processed, half open.
-  std::pair<Linear, Linear> getBin(int64_t dim);
+  std::pair<Linear, Linear> getBin(int64_t dim) { return bin.getBin(dim); }
 
 private:
+  // They need one another: what a condition says is of values, which
+  // conditions choose.
+  friend class BinFacts;
+  friend class FloatFacts;
+  friend class ConditionFacts;
   struct Scope {
     mlir::Value primitive;    ///< null for the phase of the place itself
     mlir::Value same;         ///< the primitive that it is there
     EmissionOpInterface emit; ///< or the emission of it
-  };
-  /// A float that is a multiple of 2^-shift.
-  struct Exact {
-    Linear scaled;
-    int shift;
-  };
-  /// A float of which only the floor is known, and whether it is NaN.
-  struct Opaque {
-    Linear floor, isNaN;
-    bool isWhole;
   };
   using Id = unsigned;
 
@@ -137,7 +240,6 @@ private:
   /// the branch: what holds of that holds whichever arm runs.
   void expandAhead(mlir::scf::IfOp branch, mlir::Value value, unsigned frame);
   Linear expandField(GetOp get, unsigned frame, Id id);
-  Linear expandFloatCast(mlir::Operation *op, unsigned frame, Id id);
   /// Whether a value is at least 0, found out on the way to something else.
   bool isSurelyAtLeastZero(const Linear &value) {
     return system.isAtLeastZero(value, /*effort=*/10);
@@ -152,55 +254,6 @@ private:
   Linear divide(const Linear &value, const llvm::DynamicAPInt &by);
   /// What a quotient by `by` is below, if the dividend is below a product.
   std::optional<Linear> findOtherFactor(const Linear &of, const Linear &by);
-
-  // Floats.
-  std::optional<Exact> getExact(Id id);
-  std::optional<Exact> findExact(Id id);
-  Opaque getOpaque(Id id);
-  std::optional<Exact> fitExact(Exact number, mlir::Type type);
-  /// The floor of a coordinate; adds to `unknown` what must be 0 for it.
-  Linear getCell(mlir::Value coordinate, unsigned frame,
-                 std::optional<Linear> &unknown);
-
-  // Conditions.
-  LinearFact describe(mlir::Value condition, bool truth, unsigned frame);
-  LinearFact describeInteger(mlir::arith::CmpIOp compare, bool truth,
-                             unsigned frame);
-  LinearFact describeFloat(mlir::arith::CmpFOp compare, bool truth,
-                           unsigned frame);
-  /// What a comparison of exact floats surely gives, found out on the way.
-  std::optional<bool> decide(mlir::Value condition, unsigned frame);
-  LinearFact describeUnknown(mlir::Value condition, bool truth, unsigned frame);
-  /// What a truth value says that is one of two, of which null is unknown.
-  LinearFact describeChoice(mlir::Value condition, mlir::Value ifTrue,
-                            mlir::Value ifFalse, bool truth, unsigned frame);
-  /// What one says that control flow gives.
-  std::optional<LinearFact> describeFlow(mlir::Value condition, bool truth,
-                                         unsigned frame);
-  /// That two truth values are equal, or not.
-  LinearFact describeEqual(mlir::Value a, mlir::Value b, bool isEqual,
-                           unsigned frame);
-  /// Whether a comparison for equality is that of a cell's bin with the bin
-  /// that is processed; the cell's coordinates.
-  BinAtOp getComparedCell(mlir::arith::CmpIOp compare, unsigned frame);
-  LinearFact describeInBin(BinAtOp cell, unsigned frame);
-  /// That the bin that is processed has cells of a closed box.
-  LinearFact describeTouched(AssignBoxOp box, unsigned frame);
-
-  // The bin.
-  /// Whether a list is read at an index that it has.
-  bool isInside(ListAtOp read);
-  void findItems();
-  /// Whether a value is a primitive of the bin that is processed.
-  bool isItem(mlir::Value prim, unsigned frame);
-  /// Adds that the bin that is processed is one that the stage's own assign
-  /// phase chose for a primitive.
-  void assumeAssigned(mlir::Value item);
-  /// Whether no call gets an empty list.
-  bool isNeverEmpty(mlir::Value list);
-  Linear getDomain(int64_t dim);
-  Linear addSize();
-  bool isOwnBin(mlir::Value bin, unsigned frame);
 
   const Recurrence &getRecurrence(mlir::BlockArgument argument);
 
@@ -217,14 +270,11 @@ private:
   llvm::DenseMap<std::pair<mlir::Value, unsigned>, Id> ids;
   std::map<std::vector<uintptr_t>, Id> idsByKey;
   llvm::DenseMap<Id, Linear> expressions;
-  std::map<Id, std::optional<Exact>> exacts;
-  std::map<Id, Opaque> opaques;
-  llvm::DenseMap<Id, Linear> truths; ///< of conditions that say nothing else
-  std::map<int64_t, Linear> domains;
-  std::map<int64_t, std::pair<Linear, Linear>> bins;
-  std::map<std::pair<std::string, int64_t>, Linear> extents;
   /// Products of values that are not negative, with their factors.
   std::vector<std::array<Linear, 3>> products;
+  BinFacts bin{*this};
+  FloatFacts floats{*this};
+  ConditionFacts conditions{*this};
 };
 
 /// How an argument of an `scf.while`'s first block changes.
