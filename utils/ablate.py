@@ -71,6 +71,10 @@ def parse_arguments():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--sample", type=int, default=1, metavar="N",
                         help="of test/EndToEnd, every Nth file (%(default)s)")
+    parser.add_argument("--pipes", type=int, metavar="N",
+                        help="of each text, the first N pipelines (all)")
+    parser.add_argument("--emit", choices=EMISSIONS, action="append", metavar="WHAT",
+                        help="target or gpu (both)")
     parser.add_argument("--passes", help="of these alone, between commas")
     parser.add_argument("--least", type=int, default=4, metavar="LINES",
                         help="of a pipeline that change at most where it is as it "
@@ -134,13 +138,14 @@ class Ablation:
     def __init__(self, arguments, folder):
         self.pikoc = arguments.build / "bin/pikoc"
         self.least, self.folder = arguments.least, Path(folder)
+        self.pipes, self.emissions = arguments.pipes, arguments.emit or EMISSIONS
         self.passes = list_passes(arguments)
 
     def read(self, text):
         """The pipelines of a text; none where it has errors, as some tests do."""
         names = run([self.pikoc, "--list-pipes", text.file, *text.options])
         made = []
-        for name in (names or "").split():
+        for name in (names or "").split()[:self.pipes]:
             pipeline = Pipeline(text, name)
             out = self.folder / f"{text.group}-{text.file.stem}-{name}.mlir"
             if run([self.pikoc, text.file, *text.options, "--pipe", name,
@@ -160,7 +165,7 @@ class Ablation:
                        for line in text.splitlines())
 
     def compare(self, pipeline):
-        for emission in EMISSIONS:
+        for emission in self.emissions:
             whole = self.compile(pipeline, emission)
             if whole is None:
                 continue

@@ -5,6 +5,7 @@
 #include "Piko/Target/Processor.h"
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -38,10 +39,19 @@ private:
   size_t next = 0;
 };
 
+template <class T> T toNumber(const std::string &value) {
+  T number{};
+  const char *end = value.data() + value.size();
+  auto [after, error] = std::from_chars(value.data(), end, number);
+  if (error != std::errc() || after != end)
+    throw std::runtime_error("expected a number, but got '" + value + "'");
+  return number;
+}
+
 template <class T> std::vector<T> toNumbers(std::vector<std::string> values) {
   std::vector<T> numbers;
   for (const std::string &value : values)
-    numbers.push_back(T(std::stoll(value)));
+    numbers.push_back(toNumber<T>(value));
   return numbers;
 }
 
@@ -142,7 +152,7 @@ Options parseOptions(int argc, char **argv) {
       targets = words.takeValues(name, false)[0];
     else if (name == "--mapping-window")
       options.synthesis.mappingWindow =
-          std::stod(words.takeValues(name, false)[0]);
+          toNumber<double>(words.takeValues(name, false)[0]);
     else if (name == "--target") {
       auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
       if (!target || *target == piko::GPUTarget::Auto)
@@ -166,7 +176,7 @@ Options parseOptions(int argc, char **argv) {
     else if (name == "--cpu")
       one.cpu = words.takeValues(name, false)[0];
     else if (name == "--tolerance")
-      options.tolerance = std::stod(words.takeValues(name, false)[0]);
+      options.tolerance = toNumber<double>(words.takeValues(name, false)[0]);
     else if (name == "--stops")
       options.stops = true;
     else if (name == "--spread")
