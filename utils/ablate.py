@@ -139,6 +139,7 @@ class Ablation:
         self.pikoc = arguments.build / "bin/pikoc"
         self.least, self.folder = arguments.least, Path(folder)
         self.pipes, self.emissions = arguments.pipes, arguments.emit or EMISSIONS
+        self.cpu = arguments.cpu
         self.passes = list_passes(arguments)
 
     def read(self, text):
@@ -157,6 +158,8 @@ class Ablation:
     def compile(self, pipeline, emission, without=None):
         """Its lines, without names; None where it is refused."""
         options = ["--without", without] if without else []
+        if emission == "target":
+            options += ["--cpu", self.cpu]
         text = run([self.pikoc, pipeline.authored, f"--emit={emission}", "-o", "-",
                     *options])
         if text is None:

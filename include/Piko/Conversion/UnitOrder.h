@@ -24,7 +24,8 @@ enum class UnitOrder {
   Dispatched, ///< A block has one, which the hardware begins where another one
               ///< has ended; where there are more units than blocks of a grid,
               ///< it takes the next ones.
-  Taken       ///< A block takes the next ones when it has ended its own.
+  Taken ///< It takes all of them: no pass has resolved the schedule, which
+        ///< is the same for all bins.
 };
 
 /// Of a kernel at the machine level, by what is resolved of its stage's

@@ -3,7 +3,7 @@
 // Blocks that take the next unit of work when they have ended one, so that
 // none waits for a block whose units take longer.
 //   1. Where the block begins, the first thread finds out how many units are
-//      taken at a time. If the schedule is eliminated, a grid of as many blocks
+//      taken at a time. If the hardware dispatches, a grid of as many blocks
 //      as there are units takes none: block b has unit b, and it is the
 //      hardware that begins one where another has ended.
 //   2. Before each unit it finds the unit's number: the next one of those

@@ -25,9 +25,8 @@ void piko::explainUnits(ArrayRef<KernelUnits> kernels, raw_ostream &out) {
         << (order == UnitOrder::Fixed
                 ? ": block b takes the units b, b + n, ..\n"
             : order == UnitOrder::Dispatched
-                ? ": the hardware begins a block for each; where there are "
-                  "more "
-                  "than n, a block takes the next one when it has ended one\n"
+                ? ": the hardware begins a block for each; of more than n, a "
+                  "block takes the next one when it has ended one\n"
                 : ": a block takes the next one when it has ended one\n");
 }
 

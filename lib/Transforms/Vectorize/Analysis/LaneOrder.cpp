@@ -9,7 +9,7 @@
 // passed it, and the update of a color run lane by lane, as vectors, and lane
 // by lane.
 
-#include "Vectorize/Analysis/IterationLanes.h"
+#include "Vectorize/Analysis/LaneOrder.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 

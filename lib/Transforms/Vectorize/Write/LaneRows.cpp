@@ -13,45 +13,6 @@
 using namespace mlir;
 using namespace piko;
 
-/// Whether a value grows by one from lane to lane but where it is limited: by
-/// a clamp, a remainder or a choice.
-bool LaneForms::isLimited(Value value) const {
-  if (!isVarying(value) || isLinear(value))
-    return isVarying(value);
-  Operation *op = value.getDefiningOp();
-  if (!op)
-    return false;
-  auto isPart = [&](Value part) { return !isVarying(part) || isLimited(part); };
-  if (isa<arith::IndexCastOp, arith::ExtSIOp, arith::ExtUIOp>(op))
-    return isLimited(op->getOperand(0));
-  if (isa<arith::AddIOp, arith::MinSIOp, arith::MaxSIOp, arith::MinUIOp,
-          arith::MaxUIOp>(op))
-    return isVarying(op->getOperand(0)) != isVarying(op->getOperand(1)) &&
-           llvm::all_of(op->getOperands(), isPart);
-  if (isa<arith::SubIOp, arith::RemSIOp, arith::RemUIOp>(op))
-    return isLimited(op->getOperand(0)) && !isVarying(op->getOperand(1));
-  if (auto choice = dyn_cast<arith::SelectOp>(op))
-    return isPart(choice.getTrueValue()) && isPart(choice.getFalseValue());
-  return false;
-}
-
-Value LaneForms::findLimited(Operation *op) const {
-  auto load = dyn_cast<LoadOp>(op);
-  if (!load || load.getIndices().empty() || isRow(op) ||
-      llvm::any_of(load.getIndices().drop_front(),
-                   [&](Value index) { return isVarying(index); }))
-    return {};
-  Value index = load.getIndices().front();
-  if (!isLimited(index))
-    return {};
-  // What is the same for all lanes changes nothing, but for the test.
-  while (auto cast = index.getDefiningOp<arith::IndexCastOp>())
-    index = cast.getIn();
-  while (auto sum = index.getDefiningOp<arith::AddIOp>())
-    index = sum.getOperand(isVarying(sum.getLhs()) ? 0 : 1);
-  return index;
-}
-
 /// Sums wrap around alike in the test and in the index: no lane that is active
 /// has an index out of bounds.
 void LaneMemory::writeLimited(LoadOp load, Value limited) {
