@@ -108,10 +108,28 @@ copy_apt() {
   chmod +x "$root/usr/sbin/policy-rc.d"
 }
 
+# A bind mount of this machine's would lose its devices to whoever removes the
+# folder while it is mounted.
+make_devices() {
+  local dev=$root/dev name number
+  mount -t tmpfs -o mode=755 tmpfs "$dev"
+  for name in null:3 zero:5 full:7 random:8 urandom:9; do
+    number=${name#*:} name=${name%:*}
+    mknod -m 666 "$dev/$name" c 1 "$number"
+  done
+  mknod -m 666 "$dev/tty" c 5 0
+  ln -s /proc/self/fd "$dev/fd"
+  ln -s fd/0 "$dev/stdin"
+  ln -s fd/1 "$dev/stdout"
+  ln -s fd/2 "$dev/stderr"
+  ln -s pts/ptmx "$dev/ptmx"
+  mkdir "$dev/pts" "$dev/shm"
+}
+
 mount_all() {
   mount -t proc proc "$root/proc"
   mount -t sysfs -o ro sysfs "$root/sys"
-  mount --bind /dev "$root/dev"
+  make_devices
   mount --bind /dev/pts "$root/dev/pts"
   mount -t tmpfs tmpfs "$root/dev/shm"
 }

@@ -4,6 +4,8 @@
 
 #include "Piko/Conversion/UnitOrder.h"
 
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -20,17 +22,32 @@ FlatSymbolRefAttr piko::getStageName(Operation *work) {
   return cast<WorkOpInterface>(work).getStageAttr();
 }
 
+namespace {
+/// Whose bins a kernel's units are of, and whether they are primitives of a
+/// source, which are in no bins yet.
+struct UnitSource {
+  FlatSymbolRefAttr stage;
+  bool isSource;
+};
+} // namespace
+
+static std::optional<UnitSource> findUnits(KernelOp kernel) {
+  for (auto bins : kernel.getOps<OpenBinsOp>())
+    return UnitSource{bins.getStageAttr(), bins.getSource().has_value()};
+  if (Operation *work = findWork(kernel))
+    return UnitSource{getStageName(work), isa<ItemsOp>(work)};
+  return std::nullopt;
+}
+
 std::optional<UnitOrder> piko::getUnitOrder(KernelOp kernel) {
-  Operation *work = findWork(kernel);
-  if (!work)
+  std::optional<UnitSource> units = findUnits(kernel);
+  if (!units)
     return std::nullopt;
-  // The counters are for the launches of the kernel itself.
-  if (kernel.getPrecedes())
+  // The counters are for the launches of the kernel itself. The units of a
+  // source have as many primitives each.
+  if (kernel.getPrecedes() || units->isSource)
     return UnitOrder::Fixed;
-  // A source's primitives are in no bins yet, and its units have as many each.
-  if (isa<ItemsOp>(work))
-    return UnitOrder::Fixed;
-  auto stage = lookupInPipeline<StageOp>(kernel, getStageName(work));
+  auto stage = lookupInPipeline<StageOp>(kernel, units->stage);
   ScheduleOp schedule = stage.getSchedule();
   if (!schedule)
     return UnitOrder::Dispatched;

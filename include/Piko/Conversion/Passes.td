@@ -149,7 +149,7 @@ def MapThreads : Pass<"piko-map-threads", "::piko::PipelineOp"> {
 def ExpandRemainders : Pass<"piko-expand-remainders", "::piko::PipelineOp"> {
   let summary = "Divide floats with remainder by integers";
   let description = [{
-    **Requires** the machine level (`piko-form-work`); before `convert-piko-to-gpu`.
+    **Requires** the machine level (`piko-form-work`); before `piko-form-grids`.
 
     **Does**: expands the remainder of floats of 32 and 64 bits, C's `fmod`, which a
     GPU has no instruction for: long division of the significands, as many bits at a
@@ -178,37 +178,211 @@ def ExpandRemainders : Pass<"piko-expand-remainders", "::piko::PipelineOp"> {
                            "::mlir::scf::SCFDialect"];
 }
 
-def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
-  let summary = "Turn kernels into grids of blocks and threads";
+def FormGrids : Pass<"piko-form-grids", "::piko::PipelineOp"> {
+  let summary = "Make grids of blocks of the work of kernels";
   let description = [{
     **Requires** the machine level (`piko-form-work`) and a mapping to threads
     (`piko-map-threads`).
 
-    **Does**: turns the work of each kernel into a `gpu.launch`. A block runs units of
-    the stored bins, which are fixed or taken from a counter (`piko.gpu.take_units`).
-    Threads share work as mapped:
+    **Does**: makes a `gpu.launch` of each kernel's work. A block has a unit of the
+    stored bins, with loops over its buckets and their primitives. What these emit
+    goes to append buffers (`piko.gpu.append_buffers`), and what local edges keep is
+    in shared memory. Marks of the mapping stay on loops.
 
-    - `pixels` splits off the setup of primitives (loop fission).
-    - `collapsed` takes groups of at most 64 primitives.
-    - Other mappings share primitives or iterations, and compact loops of atomics
-      (stream compaction).
+    **Guarantees** that the mapping holds: `piko.threads` is checked against what the
+    loops do.
 
-    Branches with arrays of their own, as clipping has, are marked `piko.rare`, and
-    may get a launch of their own. Emissions go to append buffers, which the block
-    flushes in lineage order.
+    Before:
+    ```
+    piko.bins of @copy {
+    ^bb0(%bin: index):
+      piko.items of @copy attributes {piko.threads = #piko<threads shared>} { ... }
+    }
+    ```
+    After:
+    ```
+    gpu.launch blocks(%unit, ...) threads(%thread, ...) {
+      piko.gpu.append_buffers %log in %buffers : memref<6xi64> using %words ...
+      scf.for %bucket = ... {
+        scf.for %i = %begin to %end step %one { ... } {piko.threads = #piko<threads shared>}
+      }
+    }
+    ```
+
+    **Limits**: functions with other bits in PTX, tiles, local edges into other bins
+    and illegal mappings are errors.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::gpu::GPUDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def SharePixels : Pass<"piko-share-pixels", "::piko::PipelineOp"> {
+  let summary = "Let the threads of a block share the pixels of a bin";
+  let description = [{
+    **Requires** grids (`piko-form-grids`).
+
+    **Does**: rewrites loops over primitives that are mapped as
+
+    - `pixels`: each thread has some pixels of a primitive. Threads share the setup of
+      primitives, which is split off (loop fission).
+    - `collapsed`: primitives are taken in groups of at most 64, whose pixels are one
+      space (loop collapsing). Each thread tests some of them, and then updates some
+      in the order of primitives. A primitive that takes a rare branch is left to a
+      second launch (`piko.gpu.leave_rest`).
+
+    Other launches stay as they are.
+
+    **Guarantees** that the updates of a pixel keep their lineage order.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      scf.for %x = %lo to %hi step %one { piko.update @image[%x] ... }
+    } {piko.threads = #piko<threads pixels>}
+    ```
+    After:
+    ```
+    scf.for %i = %begin to %end step %one {
+      scf.for %k = %zero to %count step %one {
+        %x = arith.addi %first, ... // one of the thread's
+        piko.update @image[%x] ...
+      }
+    }
+    ```
+
+    **Limits**: where a mapping that is written by hand does not hold, an error.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::gpu::GPUDialect",
+                           "::mlir::math::MathDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def ShareLoops : Pass<"piko-share-loops", "::piko::PipelineOp"> {
+  let summary = "Say which loops the threads of a block share";
+  let description = [{
+    **Requires** grids (`piko-form-grids`).
+
+    **Does**: converts loops over primitives and parallel loops as they are mapped:
+
+    - `shared`: a counted loop marked `piko.shared`.
+    - `pieces`, `pieces_of_one`: loops between barriers (loop fission), those that
+      threads share marked `piko.shared`.
+    - `by_count`: two versions, of which the number of primitives chooses one (loop
+      versioning).
+    - `one`: a counted loop; if it emits for primitives, marked `piko.ordered`.
+    - `lockstep`: stays.
+
+    Before:
+    ```
+    piko.parallel_for %n {
+    ^bb0(%i: index):
+      ...
+      piko.yield
+    } {piko.threads = #piko<threads shared>}
+    ```
+    After:
+    ```
+    scf.for %i = %zero to %n step %one { ... } {piko.shared}
+    ```
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def CompactWork : Pass<"piko-compact-work", "::piko::PipelineOp"> {
+  let summary = "Put off atomics of inner loops until all threads have some";
+  let description = [{
+    **Requires** `piko-share-loops`.
+
+    **Does**: stream compaction. In a loop that threads share, an inner loop that
+    changes state by atomics alone is put off, with the branch around it: an iteration
+    puts what that needs into a queue in shared memory, and a `piko.gpu.drain` after
+    the loop does it. Two loops that are nested become one (loop coalescing), so that
+    threads have loops of about one length.
+
+    **Guarantees** the same state: nobody sees the order of these atomics.
+
+    Before:
+    ```
+    scf.for %i = %begin to %end step %one {
+      scf.for %k = %zero to %n step %one { piko.atomic add @counts[%k] ... }
+    } {piko.shared}
+    ```
+    After:
+    ```
+    scf.for %i = %begin to %end step %one {
+      %slot = memref.atomic_rmw addi %one_i32, %count[%zero] ...
+      memref.store %n, %numbers[%slot] ...
+    } {piko.shared}
+    piko.gpu.drain %count, %lengths, %starts, %classes, %order : ... {
+    ^bb0(%entry: index):
+      ...
+    }
+    ```
+
+    **Limits**: blocks of at least 32 threads, without local edges; additions of
+    floats stay.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::gpu::GPUDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def SplitRare : Pass<"piko-split-rare", "::piko::PipelineOp"> {
+  let summary = "Give rare branches regions and launches of their own";
+  let description = [{
+    **Requires** `piko-share-loops`; best after `piko-compact-work`.
+
+    **Does**: in a loop over primitives that threads share, makes a region marked
+    `piko.rare` of each branch that alone keeps arrays, as clipping does, unless the
+    text calls it likely; `piko-outline-rare-work` makes a function of it. If all else
+    that the loop does is to emit, the kernel gets a second launch: the first one
+    leaves a unit where it comes to such a branch (`piko.gpu.leave_round`), and the
+    second one, which has the call, goes on there.
+
+    **Guarantees** the order of emissions.
+
+    Before:
+    ```
+    scf.if %usual { ... } else { memref.store %x, %array[%k] ... }
+    ```
+    After:
+    ```
+    scf.if %usual { ... } else { piko.gpu.leave_round }
+    // in the second launch
+    scf.if %usual { ... } else { scf.execute_region no_inline { ... } {piko.rare} }
+    ```
+
+    **Limits**: a kernel that precedes another one has no second launch, nor one whose
+    loop changes state.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def MapBlocks : Pass<"piko-map-blocks", "::piko::PipelineOp"> {
+  let summary = "Map the work of blocks to their threads";
+  let description = [{
+    **Requires** `piko-share-loops`.
+
+    **Does**: lets the first thread do what has effects, between barriers; threads
+    share loops marked `piko.shared`, in rounds where they emit; iterations that meet
+    at barriers are threads (`piko.parallel_for`). After a round the block takes what
+    its threads have emitted (`piko.gpu.flush`). Arrays that more than one thread sees
+    go to shared memory. Access to state is converted as by `convert-piko-to-scf`.
 
     **Guarantees** that each effect happens once, and that the result depends neither
     on the count of threads nor on their order.
 
     Before:
     ```
-    piko.bins of @copy {
-    ^bb0(%bin: index):
-      piko.items of @copy {
-      ^bb0(%f: !piko.prim<@F>):
-        %p = piko.emit 0 (%x) : i32 -> !piko.prim<@F>
-      }
-    }
+    scf.for %i = %begin to %end step %one { piko.storage.append %log[0] ... } {piko.shared}
     ```
     After:
     ```
@@ -216,23 +390,49 @@ def ConvertPikoToGPU : Pass<"convert-piko-to-gpu", "::piko::PipelineOp"> {
     scf.for %round = %begin to %end step %threads {
       %i = arith.addi %round, %thread : index
       %has = arith.cmpi slt, %i, %end : index
-      scf.if %has {
-        %p = piko.storage.append %log[0] (%x) : i32 -> !piko.prim<@F>
-        piko.storage.next %log
-      }
-      piko.gpu.flush %log using %cells : memref<33xi64, 3>
+      scf.if %has { piko.storage.append %log[0] ... }
+      piko.gpu.flush %log[%unit] using %words : memref<33xi64, 3>
     }
     gpu.barrier
     ```
-
-    **Limits**: functions with other bits in PTX, tiles, local edges into other bins
-    and illegal mappings are errors.
   }];
-  let options = [
-    Option<"compacts", "compact", "bool", "true",
-           "put off atomics of inner loops until all threads have some">,
-    Option<"splitsRare", "rare", "bool", "true",
-           "give rare branches functions and launches of their own">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::gpu::GPUDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
+def TakeUnits : Pass<"piko-take-units", "::piko::PipelineOp"> {
+  let summary = "Say which block runs which units of work";
+  let description = [{
+    **Requires** work that is mapped to threads (`piko-map-blocks`).
+
+    **Does**: puts a loop over units around the work of a block, since a grid may have
+    fewer blocks than units. By the stage's schedule, a block has every n-th unit, one
+    that the hardware begins, or takes the next one from a counter
+    (`piko.gpu.take_units`). It flushes append buffers after each unit. Launches that
+    call functions for rare primitives keep counters and append buffers in shared
+    memory, as registers are short. A kernel that precedes another one becomes a
+    launch of that one.
+
+    **Guarantees** that each unit is run once.
+
+    Before:
+    ```
+    gpu.launch blocks(%unit, ...) ... { "work"(%unit) }
+    ```
+    After:
+    ```
+    gpu.launch blocks(%block, ...) ... {
+      %units = piko.storage.unit_count %bins : !piko.bins<@F>
+      scf.for %unit = %block to %units step %blocks {
+        "work"(%unit)
+        piko.gpu.flush %log[%unit] using %words : memref<33xi64, 3>
+        gpu.barrier
+      }
+    }
+    ```
+  }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::gpu::GPUDialect",
                            "::mlir::math::MathDialect",

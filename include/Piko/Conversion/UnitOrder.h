@@ -28,8 +28,8 @@ enum class UnitOrder {
         ///< is the same for all bins.
 };
 
-/// Of a kernel at the machine level, by what is resolved of its stage's
-/// schedule; nothing for one that has no units.
+/// Of a kernel at the machine level, or that opens bins, by what is resolved of
+/// its stage's schedule; nothing for one that has no units.
 std::optional<UnitOrder> getUnitOrder(KernelOp kernel);
 
 } // namespace piko

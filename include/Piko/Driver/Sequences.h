@@ -46,6 +46,11 @@ void addVectorSequence(mlir::OpPassManager &passes,
 /// `piko-cpu-to-llvm`: from there to the llvm dialect (and omp) alone.
 void addLLVMSequence(mlir::OpPassManager &passes);
 
+/// `piko-to-grids`: from the machine level, mapped to threads, to grids of
+/// blocks; also of one pipeline.
+void addGridSequence(mlir::OpPassManager &passes,
+                     const SynthesisOptions &synthesis = {});
+
 /// `piko-to-gpu`: from the machine level to kernels in a `gpu.module`, and
 /// functions that launch them. Where the options say so, these launch them on
 /// the emulator, and kernels are in the llvm and nvvm dialects.

@@ -65,7 +65,7 @@ LogicalResult ConvertGPUToCUDAPass::declareImages(gpu::GPUModuleOp kernels) {
                          });
 }
 
-/// The stage of a kernel, as convert-piko-to-gpu has left it; null if nothing
+/// The stage of a kernel, as piko-form-grids has left it; null if nothing
 /// is known.
 static NameLoc findStage(Location location) {
   NameLoc found;

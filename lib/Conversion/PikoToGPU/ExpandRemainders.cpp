@@ -184,7 +184,7 @@ struct ExpandRemaindersPass
 void ExpandRemaindersPass::runOnOperation() {
   SmallVector<arith::RemFOp> remainders;
   getOperation().walk([&](arith::RemFOp op) {
-    // Others are refused by convert-piko-to-gpu.
+    // Others are refused by piko-form-grids.
     if (op->getParentOfType<KernelOp>() &&
         (op.getType().isF32() || op.getType().isF64()))
       remainders.push_back(op);

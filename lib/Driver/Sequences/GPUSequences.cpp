@@ -22,6 +22,22 @@ void piko::registerGPUDialects(DialectRegistry &registry) {
   registerNVVMDialectTranslation(registry);
 }
 
+void piko::addGridSequence(OpPassManager &passes,
+                           const SynthesisOptions &synthesis) {
+  bool isOfPipeline =
+      passes.getOpAnchorName() == PipelineOp::getOperationName();
+  OpPassManager &pipeline = isOfPipeline ? passes : passes.nest<PipelineOp>();
+  pipeline.addPass(createFormGrids());
+  pipeline.addPass(createSharePixels());
+  pipeline.addPass(createShareLoops());
+  if (synthesis.has("compact-work"))
+    pipeline.addPass(createCompactWork());
+  if (synthesis.has("split-rare"))
+    pipeline.addPass(createSplitRare());
+  pipeline.addPass(createMapBlocks());
+  pipeline.addPass(createTakeUnits());
+}
+
 void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
                           const SynthesisOptions &synthesis) {
   if (synthesis.has("reduce-by-atomics")) {
@@ -33,13 +49,10 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
   mapping.collapses = synthesis.has("collapse-pixels");
   mapping.groups = synthesis.has("group-updates");
   mapping.counts = synthesis.has("share-by-count");
-  ConvertPikoToGPUOptions conversion;
-  conversion.compacts = synthesis.has("compact-work");
-  conversion.splitsRare = synthesis.has("split-rare");
   OpPassManager &pipeline = passes.nest<PipelineOp>();
   pipeline.addPass(createMapThreads(mapping));
   pipeline.addPass(createExpandRemainders());
-  pipeline.addPass(createConvertPikoToGPU(conversion));
+  addGridSequence(pipeline, synthesis);
   addCleanUp(passes);
   addUnitsToLoops(passes, SynthesisOptions::none());
   // Each test that is left writes an entry of its own.

@@ -40,6 +40,10 @@ struct RefusePass : PassWrapper<RefusePass, OperationPass<ModuleOp>> {
 
 void piko::registerGPUDialects(DialectRegistry &) {}
 
+void piko::addGridSequence(OpPassManager &passes, const SynthesisOptions &) {
+  passes.nest<ModuleOp>().addPass(std::make_unique<RefusePass>());
+}
+
 void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &,
                           const SynthesisOptions &) {
   passes.addPass(std::make_unique<RefusePass>());

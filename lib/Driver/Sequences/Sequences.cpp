@@ -274,6 +274,11 @@ struct CPUSequenceOptions : PassPipelineOptions<CPUSequenceOptions> {
                              llvm::cl::init(false)};
 };
 
+struct GridSequenceOptions : PassPipelineOptions<GridSequenceOptions> {
+  ListOption<std::string> without{*this, "without",
+                                  llvm::cl::desc("Passes to leave out")};
+};
+
 struct GPUSequenceOptions : PassPipelineOptions<GPUSequenceOptions> {
   Option<int64_t> threads{*this, "threads",
                           llvm::cl::desc("Threads of a block"),
@@ -282,6 +287,12 @@ struct GPUSequenceOptions : PassPipelineOptions<GPUSequenceOptions> {
 } // namespace
 
 void piko::registerSequences() {
+  PassPipelineRegistration<GridSequenceOptions>(
+      "piko-to-grids", "From the machine level to grids of blocks and threads",
+      [](OpPassManager &passes, const GridSequenceOptions &options) {
+        addGridSequence(passes, {.without = {options.without.begin(),
+                                             options.without.end()}});
+      });
   PassPipelineRegistration<GPUSequenceOptions>(
       "piko-to-gpu", "From the machine level to kernels for a GPU",
       [](OpPassManager &passes, const GPUSequenceOptions &options) {

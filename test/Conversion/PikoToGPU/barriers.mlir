@@ -1,5 +1,5 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu. --implicit-check-not=piko.parallel
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=16},convert-piko-to-gpu))' --split-input-file -o /dev/null 2>&1 | FileCheck %s --check-prefix=PIECES
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu. --implicit-check-not=piko.parallel
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=16},piko-to-grids))' --split-input-file -o /dev/null 2>&1 | FileCheck %s --check-prefix=PIECES
 // Iterations that meet at barriers are threads of a block.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4

@@ -1,6 +1,7 @@
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32}))' --split-input-file | FileCheck %s --check-prefix=MAPPED
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' --split-input-file | FileCheck %s
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32 by-count=false}))' --split-input-file | FileCheck %s --check-prefix=PLAIN
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},piko-form-grids,piko-share-loops))' --split-input-file | FileCheck %s --check-prefix=LOOPS
 // PLAIN-NOT: by_count
 // PLAIN:     piko.items of @a lanes iterations attributes {piko.threads = #piko<threads one>} {
 // PLAIN-NOT: by_count
@@ -11,6 +12,19 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // MAPPED-LABEL: piko.pipeline @Emits
 // MAPPED:         piko.items of @a lanes iterations attributes {piko.fewest = 5 : i64, piko.threads = #piko<threads by_count>} {
 // MAPPED:           piko.parallel_for %{{.*}} attributes {piko.threads = #piko<threads shared>} {
+// LOOPS-LABEL: piko.pipeline @Emits
+// LOOPS:         scf.if
+// LOOPS:           scf.for
+// LOOPS:             scf.for
+// LOOPS-NOT:           piko.shared
+// LOOPS:             piko.storage.append
+// LOOPS:             }
+// LOOPS:           } {{.*}}piko.shared
+// LOOPS:         } else {
+// LOOPS:           scf.for
+// LOOPS:             scf.for
+// LOOPS:             } {piko.shared}
+// LOOPS:           } {{.*}}piko.ordered
 // CHECK-LABEL: piko.pipeline @Emits
 // CHECK:         gpu.launch
 // CHECK-SAME:      threads(%[[T:[a-z0-9]+]],

@@ -1,5 +1,5 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},convert-piko-to-gpu))' --split-input-file --verify-diagnostics -o /dev/null
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=256},convert-piko-to-gpu))' --split-input-file -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},piko-to-grids))' --split-input-file --verify-diagnostics -o /dev/null
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=256},piko-to-grids))' --split-input-file -o /dev/null 2>&1 | FileCheck %s --check-prefix=MANY
 
 // Why threads take the pixels of one primitive after the other.
 

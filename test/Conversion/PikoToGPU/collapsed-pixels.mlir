@@ -1,5 +1,5 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=16},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s --check-prefix=FEW
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},piko-to-grids),cse,canonicalize)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=16},piko-to-grids),cse,canonicalize)' | FileCheck %s --check-prefix=FEW
 // RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64 collapse=false}))' | FileCheck %s --check-prefix=UNSHARED
 // UNSHARED-NOT: #piko<threads collapsed>
 // UNSHARED:     piko.kernel @kernel_draw

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=64},piko-to-grids),cse,canonicalize)' | FileCheck %s
 
 piko.record @Plane {"x" : i32 at 0, "y" : i32 at 4, "toX" : i32 at 8,
                     "toY" : i32 at 12, "dx" : i64 at 16, "dy" : i64 at 24}

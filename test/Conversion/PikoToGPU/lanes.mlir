@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-lanes,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-lanes,piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' | FileCheck %s
 // A block's threads are given what piko-map-lanes says.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4

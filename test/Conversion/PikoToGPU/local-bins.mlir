@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s --implicit-check-not=piko.cpu.
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' | FileCheck %s --implicit-check-not=piko.cpu.
 // What a stage emits into its own bin is read there, after a flush: in batches of
 // three, by the first thread of each; then the block forgets it.
 
@@ -10,7 +10,7 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // CHECK-SAME:        workgroup(%[[CELLS:.*]] : memref<33xi64, {{.*}}>, %[[KEPT:.*]] : memref<4xi64, #gpu.address_space<workgroup>>
 // CHECK:           %[[BOXES:.*]] = memref.alloca() : memref<14xi64>
 // CHECK-COUNT-4:   memref.store %c0_i64, %[[KEPT]]
-// CHECK:           piko.gpu.append_buffers %[[LOG]] in %[[BOXES]] : memref<14xi64> local [@start] [0] in %[[KEPT]]
+// CHECK:           piko.gpu.append_buffers %[[LOG]] in %[[BOXES]] : memref<14xi64> using %[[CELLS]]{{.*}} local [@start] [0] in %[[KEPT]]
 // CHECK:           %[[OTHER:.*]] = piko.gpu.log_of %[[LOG]] of @last
 // CHECK:             piko.storage.append %[[LOG]][0]
 // CHECK:             piko.storage.append_bin %[[LOG]][0] of @last

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(convert-piko-to-gpu))' --split-input-file --verify-diagnostics
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-to-grids))' --split-input-file --verify-diagnostics
 // RUN: not piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=48}))' --split-input-file 2>&1 | FileCheck %s --check-prefix=THREADS
 // RUN: not piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=2048}))' --split-input-file 2>&1 | FileCheck %s --check-prefix=THREADS
 // THREADS: error: expected a power of two up to 1024 for the threads of a block, but got {{48|2048}}

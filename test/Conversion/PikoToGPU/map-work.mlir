@@ -1,10 +1,33 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu.
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' --split-input-file | FileCheck %s --implicit-check-not=piko.cpu.
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},piko-form-grids))' --split-input-file | FileCheck %s --check-prefix=GRID
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},piko-form-grids,piko-share-loops,piko-map-blocks))' --split-input-file | FileCheck %s --check-prefix=MAPPED
 // What a block's threads do where they do not share the pixels of a bin.
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
 // Threads share the primitives of a bin; after each round the block takes what
 // they have emitted.
+// GRID-LABEL: piko.kernel @kernel_copy
+// GRID:         %[[BINS:.*]] = piko.storage.open_bins @copy
+// GRID:         %[[LOG:.*]] = piko.gpu.open_log %[[BINS]]
+// GRID:         gpu.launch blocks(%[[UNIT:[a-z0-9]+]],
+// GRID-SAME:        function(@Emits_kernel_copy)
+// GRID-SAME:        workgroup(%[[WORDS:[a-z0-9]*]] : memref<33xi64,
+// GRID:           piko.gpu.append_buffers %[[LOG]] in %{{.*}} : memref<7xi64> using %[[WORDS]]
+// GRID:           piko.storage.unit_buckets %[[BINS]][%[[UNIT]]]
+// GRID:           scf.for %[[BUCKET:.*]] =
+// GRID:             piko.storage.bucket_range %[[BINS]][%[[UNIT]], %[[BUCKET]]]
+// GRID:             scf.for
+// GRID:               piko.storage.append %[[LOG]][0]
+// GRID:             } {{.*}}piko.threads = #piko<threads shared>
+// GRID:         piko.gpu.close_log %[[LOG]]
+// Without a loop over units yet.
+// MAPPED-LABEL: piko.kernel @kernel_copy
+// MAPPED:         gpu.launch
+// MAPPED-NOT:       piko.storage.unit_count
+// MAPPED:           piko.gpu.flush
+// MAPPED-NOT:       piko.gpu.flush
+// MAPPED:         } {piko.threaded}
 // CHECK-LABEL: piko.kernel @kernel_copy
 // CHECK:         %[[LOG:.*]] = piko.gpu.open_log
 // CHECK:         gpu.launch blocks(%[[UNIT:[a-z0-9]+]], {{.*}}threads(%[[T:[a-z0-9]+]],

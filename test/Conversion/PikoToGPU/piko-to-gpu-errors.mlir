@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,convert-piko-to-gpu))' --split-input-file --verify-diagnostics %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,piko-to-grids))' --split-input-file --verify-diagnostics %s
 // What a kernel on a GPU cannot do, and why threads do not share the pixels of a
 // bin.
 

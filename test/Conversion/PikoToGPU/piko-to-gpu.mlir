@@ -1,6 +1,6 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=8},convert-piko-to-gpu),cse,canonicalize)' | FileCheck %s
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=1},convert-piko-to-gpu))' | FileCheck %s --check-prefix=ONE
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,convert-piko-to-gpu))' | FileCheck %s --check-prefix=STAGE
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=8},piko-to-grids),cse,canonicalize)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=1},piko-to-grids))' | FileCheck %s --check-prefix=ONE
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,piko-to-grids))' | FileCheck %s --check-prefix=STAGE
 
 piko.record @Row {"x" : i32 at 0, "y" : i32 at 4, "to" : i32 at 8} size 12 align 4
 piko.record @Pixel {"n" : i32 at 0} size 4 align 4

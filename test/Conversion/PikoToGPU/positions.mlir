@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-program,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu))' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-program,piko-form-work,piko-map-threads{threads=32},piko-to-grids))' --split-input-file | FileCheck %s
 
 // What is concatenated needs no positions: nobody asks where it was emitted.
 piko.record @F {"x" : i32 at 0} size 4 align 4

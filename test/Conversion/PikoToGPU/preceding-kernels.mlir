@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-program,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-program,piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' | FileCheck %s
 // RUN: not piko-opt %s --piko-to-units 2>&1 | FileCheck %s --check-prefix=CPU
 
 // A kernel that precedes another one is a launch of that one's, before its

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-map-threads,piko-expand-remainders,convert-piko-to-gpu),canonicalize,cse)' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-work,piko-map-threads,piko-expand-remainders,piko-to-grids),canonicalize,cse)' %s | FileCheck %s
 
 piko.record @F {"x" : f32 at 0, "y" : f64 at 8} size 16 align 8
 

@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=16},convert-piko-to-gpu),canonicalize,cse)' --split-input-file 2>/dev/null | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-form-work,piko-map-threads{threads=16},piko-to-grids),canonicalize,cse)' --split-input-file 2>/dev/null | FileCheck %s
 // Where a loop of more iterations than threads is cut, threads share the steps of its
 // sorts, scans and reductions: those of one distance are independent.
 

@@ -1,5 +1,5 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,convert-piko-to-gpu))' --split-input-file | FileCheck %s
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu))' --split-input-file | FileCheck %s --check-prefix=ASKED
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads,piko-to-grids))' --split-input-file | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},piko-to-grids))' --split-input-file | FileCheck %s --check-prefix=ASKED
 
 // A bin of 64 x 64 pixels has a thread for every 16, and not the stage's 64.
 // CHECK-LABEL: piko.pipeline @Large

@@ -1,5 +1,5 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-pre-schedule,piko-eliminate-schedules,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},convert-piko-to-gpu),canonicalize,cse)' | FileCheck %s --check-prefix=ASKED
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-pre-schedule,piko-eliminate-schedules,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-order-stages,piko-form-kernels,piko-form-work,piko-map-threads{threads=32},piko-to-grids),canonicalize,cse)' | FileCheck %s --check-prefix=ASKED
 // Which block of a grid runs which unit, by what is resolved of the stage's schedule.
 
 // Where nothing is, blocks take units from a counter, and the hardware starts none.

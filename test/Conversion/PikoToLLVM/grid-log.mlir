@@ -1,4 +1,4 @@
-// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=64},convert-piko-to-gpu,piko-form-program,convert-piko-to-scf),convert-piko-to-llvm,canonicalize,cse)' | FileCheck %s
+// RUN: piko-opt %s --pass-pipeline='builtin.module(piko.pipeline(piko-map-threads{threads=64},piko-to-grids,piko-form-program,convert-piko-to-scf),convert-piko-to-llvm,canonicalize,cse)' | FileCheck %s
 // What a thread emits goes to its append buffer, and where that is full to another piece
 // of memory; a flush says in a directory what the threads of a block have.
 

@@ -10,7 +10,7 @@
 // with the same bits, because integers wrap; and threads can take iterations in
 // any order.
 
-#include "PikoToGPU/PikoToGPU.h"
+#include "PikoToGPU/Mapping/PixelNest.h"
 
 #include "mlir/Dialect/Utils/StaticValueUtils.h"
 #include "llvm/ADT/BitVector.h"

@@ -22,7 +22,9 @@
 
 #include "PikoToGPU/Mapping/GroupUpdates.h"
 #include "PikoToGPU/Mapping/PixelOwners.h"
+#include "PikoToGPU/Mapping/RareBranches.h"
 #include "PikoToGPU/Mapping/SetupSplit.h"
+#include "PikoToGPU/PikoToGPU.h"
 
 #include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"

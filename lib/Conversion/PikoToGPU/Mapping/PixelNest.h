@@ -77,6 +77,10 @@ struct PixelNestResult {
 };
 PixelNestResult findPixelNest(mlir::Operation *items, StageOp stage);
 
+/// Lets no integer go from pixel to pixel that is another function of the
+/// pixel.
+void useClosedFormsInPixelLoops(mlir::Operation *items);
+
 /// Moves what does not differ between pixels out of the loops over them.
 void hoistOutOfPixelLoops(mlir::Operation *items);
 

@@ -19,6 +19,11 @@
 using namespace mlir;
 using namespace piko;
 
+ThreadTile::ThreadTile(int64_t threads, int64_t rank) : extents(rank, 1) {
+  for (int64_t dim = 0; threads > 1; threads /= 2, dim = (dim + 1) % rank)
+    extents[dim] *= 2;
+}
+
 namespace {
 
 class OwnerFinder {

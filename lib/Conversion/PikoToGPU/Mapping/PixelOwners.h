@@ -6,9 +6,23 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_PIXELOWNERS_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_MAPPING_PIXELOWNERS_H
 
-#include "PikoToGPU/PikoToGPU.h"
+#include "PikoToGPU/Mapping/WorkLegality.h"
 
 namespace piko {
+
+/// How the threads of a block share the pixels of a bin: a tile of as many
+/// pixels as there are threads is laid over the domain again and again.
+struct ThreadTile {
+  /// `threads` is a power of two; it is split evenly over the dimensions, the
+  /// first ones before the others.
+  ThreadTile(int64_t threads, int64_t rank);
+
+  /// Powers of two, so that arithmetic that wraps cannot change whose a pixel
+  /// is.
+  llvm::SmallVector<int64_t> extents;
+  /// The thread's place in the tile.
+  llvm::SmallVector<mlir::Value> place;
+};
 
 /// What a thread does where a coordinate, the root, is one of its own.
 struct OwnedWork {

@@ -89,8 +89,13 @@ static LogicalResult verifyPrecedes(KernelOp kernel) {
     return success();
   auto next = lookupInPipeline<KernelOp>(kernel, kernel.getPrecedesAttr());
   auto getStage = [](KernelOp of) {
-    auto all = of.getOps<BinsOp>();
-    return all.empty() ? FlatSymbolRefAttr() : (*all.begin()).getStageAttr();
+    for (Operation &op : *of.getBodyBlock()) {
+      if (auto bins = dyn_cast<BinsOp>(op))
+        return bins.getStageAttr();
+      if (auto bins = dyn_cast<OpenBinsOp>(op))
+        return bins.getStageAttr();
+    }
+    return FlatSymbolRefAttr();
   };
   if (!next || next.getPrecedes() || !getStage(kernel) ||
       getStage(next) != getStage(kernel))

@@ -59,6 +59,21 @@ constexpr llvm::StringLiteral fewest = "piko.fewest";
 constexpr llvm::StringLiteral blockSize = "piko.block_size";
 /// A loop whose iterations have append buffers of their own.
 constexpr llvm::StringLiteral reordered = "piko.reordered";
+/// A loop over primitives that the first thread of a block does in order, and
+/// emits in.
+constexpr llvm::StringLiteral ordered = "piko.ordered";
+/// A launch whose work is mapped to the threads of a block.
+constexpr llvm::StringLiteral threaded = "piko.threaded";
+/// A kernel's second launch, which goes on with the units that the first one
+/// has left, and the loop over primitives in it that begins where that was.
+constexpr llvm::StringLiteral rest = "piko.rest";
+/// A launch that keeps the counters of its units and buckets in shared memory.
+constexpr llvm::StringLiteral blockCounters = "piko.block_counters";
+/// A launch that keeps its threads' append buffers in shared memory.
+constexpr llvm::StringLiteral blockBuffers = "piko.block_buffers";
+/// A loop that all threads of a block run alike, which takes what it needs of
+/// what is around it from shared memory.
+constexpr llvm::StringLiteral blockValues = "piko.block_values";
 /// A loop of a kernel that is to be a function of its own: few primitives need
 /// it.
 constexpr llvm::StringLiteral rare = "piko.rare";

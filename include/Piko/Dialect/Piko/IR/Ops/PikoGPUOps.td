@@ -76,22 +76,27 @@ def Piko_AppendBuffersOp : Piko_GPUOp<"append_buffers"> {
     for the log and one for each port of a local edge, of six numbers each. What the
     block has of a local edge is in its memory, four numbers each. `for errors`:
     that of the log is in the log itself, from the first error on, and the first
-    number is its address; so a grid that emits nothing keeps one number.
+    number is its address; so a grid that emits nothing keeps one number. `words` are
+    those that the block needs to take what is in them (`piko.gpu.flush`).
 
     ```mlir
-    piko.gpu.append_buffers %log in %numbers : memref<6xi64>
-    piko.gpu.append_buffers %log for errors in %numbers : memref<6xi64>
-    piko.gpu.append_buffers %log in %more : memref<12xi64> local [@test] [0] in %kept
-      : memref<4xi64, 3>
+    piko.gpu.append_buffers %log in %numbers : memref<6xi64> using %words
+      : memref<33xi64, 3>
+    piko.gpu.append_buffers %log for errors in %numbers : memref<6xi64> using %words
+      : memref<33xi64, 3>
+    piko.gpu.append_buffers %log in %more : memref<12xi64> using %words
+      : memref<33xi64, 3> local [@test] [0] in %kept : memref<4xi64, 3>
     ```
   }];
   let arguments = (ins Piko_WriterType:$log, MemRefOf<[I64]>:$state,
+                       MemRefOf<[I64]>:$words,
                        OptionalAttr<FlatSymbolRefArrayAttr>:$producers,
                        OptionalAttr<DenseI64ArrayAttr>:$ports,
                        Optional<MemRefOf<[I64]>>:$kept,
                        UnitAttr:$forErrors);
   let assemblyFormat = [{
     $log (`for` `errors` $forErrors^)? `in` $state `:` type($state)
+    `using` $words `:` type($words)
     (`local` $producers^ $ports `in` $kept `:` type($kept))? attr-dict
   }];
 }
@@ -157,6 +162,63 @@ def Piko_LeaveRestOp : Piko_GPUOp<"leave_rest"> {
   }];
   let arguments = (ins Piko_WriterType:$log, Index:$unit, Index:$position);
   let assemblyFormat = "$log `[` $unit `]` `from` $position attr-dict";
+}
+
+def Piko_LeaveRoundOp : Piko_GPUOp<"leave_round"> {
+  let summary = "a thread has come to a primitive that the next launch takes";
+  let description = [{
+    In a loop over primitives that threads share: before this round of it, the block
+    leaves the unit to the kernel's second launch. What threads have emitted in the
+    round is dropped. `piko-map-blocks` makes a `piko.gpu.leave_rest` of it.
+
+    ```mlir
+    piko.gpu.leave_round
+    ```
+  }];
+  let assemblyFormat = "attr-dict";
+}
+
+def Piko_DrainOp : Piko_GPUOp<"drain", [
+    SingleBlock, NoTerminator, RecursiveMemoryEffects]> {
+  let summary = "does what iterations of a shared loop have put off";
+  let description = [{
+    Of the loop before it. Iterations put an entry into a queue in shared memory, of
+    which `count` are there; `lengths` has how many there are of each class of
+    length, and `classes` the class of each entry (the lower eight bits) and its
+    place in that. The threads of the block do the body for each entry, whose number
+    is its argument, the longest first: after the loop, and between rounds of it
+    after which another one might find no room. `starts` and `order` are needed on
+    the way.
+
+    ```mlir
+    scf.for %i = %begin to %end step %one {
+      %entry = memref.atomic_rmw addi %one_i32, %count[%zero]
+        : (i32, memref<1xi32, 3>) -> i32
+      ...
+    } {piko.shared}
+    piko.gpu.drain %count, %lengths, %starts, %classes, %order : memref<1xi32, 3>,
+        memref<32xi32, 3>, memref<32xi32, 3>, memref<96xi32, 3>, memref<96xi16, 3> {
+    ^bb0(%entry: index):
+      piko.atomic add @counts[%entry : index] "n", %one_i32 : i32
+    }
+    ```
+  }];
+  let arguments = (ins MemRefRankOf<[I32], [1]>:$count,
+                       MemRefRankOf<[I32], [1]>:$lengths,
+                       MemRefRankOf<[I32], [1]>:$starts,
+                       MemRefRankOf<[I32], [1]>:$classes,
+                       MemRefRankOf<[I16], [1]>:$order);
+  let regions = (region SizedRegion<1>:$body);
+  let hasRegionVerifier = 1;
+  let assemblyFormat = [{
+    operands attr-dict `:` type(operands) $body
+  }];
+  let extraClassDeclaration = [{
+    ::mlir::Block *getBodyBlock() { return &getBody().front(); }
+    ::mlir::Value getEntry() { return getBody().getArgument(0); }
+    /// How many entries the queue has room for.
+    int64_t getCapacity() { return getOrder().getType().getNumElements(); }
+  }];
 }
 
 def Piko_TakeUnitsOp : Piko_GPUOp<"take_units"> {
