@@ -41,8 +41,9 @@ struct TakeUnitsPass : piko::impl::TakeUnitsBase<TakeUnitsPass> {
 static scf::ForOp repeatForUnits(gpu::LaunchOp launch, Value bins,
                                  Operation *opened) {
   Location loc = launch.getLoc();
-  Block &body = launch.getBody().front();
-  OpBuilder builder = OpBuilder::atBlockBegin(&body);
+  OpBuilder builder = OpBuilder::atBlockBegin(&launch.getBody().front());
+  // Large arrays of the block have a test around all that uses them.
+  Block &body = *opened->getBlock();
   Value count = UnitCountOp::create(builder, loc, bins);
   builder.setInsertionPoint(body.getTerminator());
   Value first = launch.getBlockIds().x;
