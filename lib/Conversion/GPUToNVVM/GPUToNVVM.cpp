@@ -3,8 +3,8 @@
 // convert-gpu-to-exact-nvvm: kernels to the nvvm and llvm dialects.
 
 #include "GPUToNVVM/ExactFunctions.h"
-#include "GPUToNVVM/Registers.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Conversion/Passes.h"
 
 #include "mlir/Conversion/ArithToLLVM/ArithToLLVM.h"

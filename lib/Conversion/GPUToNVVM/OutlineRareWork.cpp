@@ -11,8 +11,7 @@
 //      registers;
 //   4. forbid to inline it again, and bound the registers of both.
 
-#include "GPUToNVVM/Registers.h"
-
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Conversion/Passes.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"

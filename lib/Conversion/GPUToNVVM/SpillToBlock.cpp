@@ -12,6 +12,7 @@
 // So ptxas has nothing to spill to the thread's own memory, where a spill is
 // several times as slow, and the choice is by how often a number is needed.
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Conversion/Passes.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -243,9 +244,6 @@ static bool isBounded(gpu::GPUFuncOp kernel) {
              .wasInterrupted();
 }
 
-/// With more, a multiprocessor has few blocks.
-static constexpr int64_t maxSpillBytes = 24 << 10;
-
 static int64_t getBlockBytes(gpu::GPUFuncOp kernel) {
   int64_t bytes = 0;
   for (Value memory : kernel.getWorkgroupAttributions()) {
@@ -279,7 +277,7 @@ void SpillToBlockPass::runOnOperation() {
     DenseI32ArrayAttr size = kernel.getKnownBlockSizeAttr();
     if (!kernel.isKernel() || !size || !isBounded(kernel))
       continue;
-    int64_t room = (maxSpillBytes - getBlockBytes(kernel)) / size[0],
+    int64_t room = (fewSharedBytes - getBlockBytes(kernel)) / size[0],
             bytesLeft = std::min(maxBytes.getValue(), room);
     for (LoopLikeOpInterface loop : findLoops(kernel))
       Spiller(kernel, loop, size[0]).run(maxRegisters, bytesLeft);

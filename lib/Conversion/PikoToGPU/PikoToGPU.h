@@ -5,6 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_PIKOTOGPU_H
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
@@ -12,9 +13,6 @@
 #include "mlir/Dialect/SCF/IR/SCF.h"
 
 namespace piko {
-
-/// What every GPU's blocks have.
-constexpr int64_t maxThreads = 1024, maxSharedBytes = 48 << 10, warpSize = 32;
 
 /// Whether an operation, or one inside it, is one of those.
 template <typename Predicate>

@@ -5,6 +5,7 @@
 #include "PikoToLLVM/LoweringContext.h"
 
 #include "Piko/Analysis/StageGraph.h"
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -476,7 +477,7 @@ Value piko::createOffset(OpBuilder &builder, Location loc, Value pointer,
 void piko::createPrefetch(OpBuilder &builder, Location loc, Value pointer,
                           int64_t bytes) {
   constexpr int32_t read = 0, keep = 3, data = 1;
-  constexpr int64_t line = 64, mostLines = 4;
+  constexpr int64_t mostLines = 4;
   auto ask = [&](int64_t offset) {
     Value at = LLVM::GEPOp::create(builder, loc, pointer.getType(),
                                    builder.getI8Type(), pointer,
@@ -484,8 +485,8 @@ void piko::createPrefetch(OpBuilder &builder, Location loc, Value pointer,
     LLVM::Prefetch::create(builder, loc, at, read, keep, data);
   };
   LLVM::Prefetch::create(builder, loc, pointer, read, keep, data);
-  for (int64_t offset = line; offset < std::min(bytes - 1, mostLines * line);
-       offset += line)
+  for (int64_t offset = lineSize;
+       offset < std::min(bytes - 1, mostLines * lineSize); offset += lineSize)
     ask(offset);
   if (bytes > 1)
     ask(bytes - 1);

@@ -4,6 +4,7 @@
 
 #include "PikoToLLVM/GPU/GridLog.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
@@ -208,7 +209,6 @@ struct PrefetchLowering : ContextPattern<PrefetchOp> {
                                         rewriter.getI8Type(), view.data,
                                         ArrayRef<LLVM::GEPArg>{offset});
     // Records that divide a line are mostly in one.
-    constexpr int64_t lineSize = 64;
     createPrefetch(rewriter, loc, element,
                    lineSize % record.getSize() == 0 ? 1 : record.getSize());
     rewriter.eraseOp(op);

@@ -8,6 +8,7 @@
 
 #include "PikoToSCF/Tiles.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Transforms/Storage/PixelAccess.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
@@ -101,7 +102,6 @@ void TileLowering::createArrays() {
     places[field.getName()] = array.count;
     array.count += field.getElementCount();
   }
-  constexpr int64_t lineSize = 64;
   int64_t pixels = ShapedType::getNumElements(getExtents());
   for (auto &[type, array] : arrays)
     array.memory = memref::AllocaOp::create(

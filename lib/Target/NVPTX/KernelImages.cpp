@@ -3,6 +3,7 @@
 // PTX and cubins as constants of the host's module.
 
 #include "Piko/Target/KernelImages.h"
+#include "Piko/Analysis/TargetModel.h"
 
 #include "KernelReports.h"
 
@@ -64,13 +65,12 @@ static void defineList(Module &host, GlobalVariable *declared,
 /// A block's shared memory is declared in PTX, and 48 KB is what drivers give
 /// to that.
 static Error checkBlockMemory(const Module &module) {
-  constexpr int64_t most = 48 << 10;
   for (const KernelResources &kernel : findKernels(module))
-    if (kernel.blockMemory > most)
+    if (kernel.blockMemory > maxSharedBytes)
       return createStringError(
           "kernel '" + kernel.kernel + "' needs " + Twine(kernel.blockMemory) +
           " bytes of the memory of a block of " + Twine(kernel.threads) +
-          " threads, but a block has " + Twine(most) +
+          " threads, but a block has " + Twine(maxSharedBytes) +
           "; --gpu-threads with fewer takes less");
   return Error::success();
 }

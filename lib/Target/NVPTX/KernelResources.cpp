@@ -4,6 +4,7 @@
 // Compute Capability" in NVIDIA's CUDA C++ Programming Guide.
 
 #include "Piko/Target/KernelResources.h"
+#include "Piko/Analysis/TargetModel.h"
 
 #include "KernelReports.h"
 
@@ -41,7 +42,6 @@ static constexpr ChipLimits chips[] = {{"sm_70", 2048, 32, 96 << 10, 0},
                                        {"sm_90", 2048, 32, 228 << 10, 1024},
                                        {"sm_100", 2048, 32, 228 << 10, 1024},
                                        {"sm_120", 1536, 32, 100 << 10, 1024}};
-static constexpr int64_t registersOfMultiprocessor = 64 << 10;
 
 static const ChipLimits *findLimits(StringRef chip) {
   const auto *limits =
@@ -60,16 +60,15 @@ std::optional<double> KernelResources::getOccupancy(StringRef chip) const {
   const ChipLimits *limits = findLimits(chip);
   if (!limits || !assembled || threads == 0)
     return std::nullopt;
-  // Registers are given to warps, in pieces of 256.
-  int64_t warps = divideCeil(threads, 32);
-  int64_t ofWarp =
-      alignTo(std::max<int64_t>(assembled->registers, 1) * 32, 256);
+  int64_t warps = divideCeil(threads, warpSize);
+  int64_t ofWarp = alignTo(
+      std::max<int64_t>(assembled->registers, 1) * warpSize, registerPiece);
   int64_t memory = alignTo(blockMemory + limits->reserved, 128);
   int64_t blocks =
-      std::min({limits->blocks, limits->threads / (warps * 32),
+      std::min({limits->blocks, limits->threads / (warps * warpSize),
                 registersOfMultiprocessor / (ofWarp * warps),
                 limits->blockMemory / std::max<int64_t>(memory, 1)});
-  return double(blocks * warps * 32) / double(limits->threads);
+  return double(blocks * warps * warpSize) / double(limits->threads);
 }
 
 //===----------------------------------------------------------------------===//

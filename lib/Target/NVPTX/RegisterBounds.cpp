@@ -11,6 +11,7 @@
 
 #include "KernelReports.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Target/Assembler.h"
 
 #include "llvm/ADT/StringExtras.h"
@@ -21,8 +22,8 @@
 using namespace llvm;
 using namespace piko;
 
-/// Registers are given to warps in pieces of 256: 8 for each thread.
-static constexpr int64_t piece = 8, tries = 3, most = 255;
+/// What a thread gets of a piece.
+static constexpr int64_t piece = registerPiece / warpSize, tries = 3;
 static constexpr double leastOccupancy = 0.75;
 
 static bool spills(const KernelResources &kernel) {
@@ -113,7 +114,7 @@ std::vector<std::string> RegisterBounds::raise() {
       continue;
     int64_t known = std::max(bound, kernel.assembled->registers);
     int64_t next = alignDown(known, piece) + piece;
-    if (next > most || !isWorthIt(before, next, chip))
+    if (next > maxRegistersOfThread || !isWorthIt(before, next, chip))
       continue;
     bound = next;
     raised.push_back(kernel.kernel);

@@ -7,7 +7,6 @@
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
-#include "mlir/IR/Matchers.h"
 #include "llvm/ADT/TypeSwitch.h"
 
 using namespace mlir;
@@ -30,133 +29,58 @@ Value piko::stripWidening(Value value) {
 // Loops
 //===----------------------------------------------------------------------===//
 
-/// Takes a condition apart into bounds of one counter; false if it says more.
-static bool addBounds(Value condition, BlockArgument &counter,
-                      CountedLoop &loop) {
-  using P = arith::CmpIPredicate;
-  Operation *op = condition.getDefiningOp();
-  if (isa_and_nonnull<arith::AndIOp>(op))
-    return addBounds(op->getOperand(0), counter, loop) &&
-           addBounds(op->getOperand(1), counter, loop);
-  auto compare = dyn_cast_or_null<arith::CmpIOp>(op);
-  if (!compare)
-    return false;
-  Value value = compare.getLhs(), bound = compare.getRhs();
-  P predicate = compare.getPredicate();
-  auto isCounter = [&](Value side) {
-    auto argument = dyn_cast<BlockArgument>(side);
-    return argument && argument.getOwner()->getParentOp() == loop.op &&
-           (!counter || argument == counter);
-  };
-  if (!isCounter(value)) {
-    if (!isCounter(bound))
-      return false;
-    std::swap(value, bound);
-    predicate = predicate == P::sgt   ? P::slt
-                : predicate == P::sge ? P::sle
-                : predicate == P::slt ? P::sgt
-                : predicate == P::sle ? P::sge
-                                      : predicate;
-  }
-  counter = cast<BlockArgument>(value);
-  switch (predicate) {
-  case P::slt:
-    loop.uppers.push_back({LoopBound::Exclusive, bound, compare});
-    return true;
-  case P::sle:
-    loop.uppers.push_back({LoopBound::Inclusive, bound, compare});
-    return true;
-  case P::ne:
-    loop.uppers.push_back({LoopBound::Unequal, bound, compare});
-    return true;
-  case P::sgt:
-  case P::sge:
-    if (!loop.refusal.at)
-      loop.refusal = {compare, "it counts down"};
-    return true;
-  default:
-    return false;
-  }
+static void refuse(LoopOverPixels &loop, Operation *at, const Twine &why) {
+  if (!loop.refusal.at)
+    loop.refusal = {at, why.str()};
 }
 
-static bool isStep(Value next, Value counter, APInt &step) {
-  auto add = next.getDefiningOp<arith::AddIOp>();
-  return add && add.getLhs() == counter &&
-         matchPattern(add.getRhs(), m_ConstantInt(&step));
-}
-
-/// What hands `scf.while` on from one iteration to the next, but its counter.
-static void findCarried(scf::WhileOp loop, BlockArgument before,
-                        CountedLoop &result) {
-  auto refuse = [&](Operation *at, const Twine &why) {
-    if (!result.refusal.at)
-      result.refusal = {at, why.str()};
+/// What an scf.while hands on from one iteration to the next, but its counter.
+static void refuseCarried(scf::WhileOp loop, LoopOverPixels &result) {
+  auto made = [&](Value value, Operation *otherwise) {
+    return value.getDefiningOp() ? value.getDefiningOp() : otherwise;
   };
-  for (auto [argument, next] :
-       llvm::zip(loop.getBeforeArguments(), loop.getYieldOp().getResults()))
-    if (argument != before)
-      refuse(next.getDefiningOp() ? next.getDefiningOp() : loop,
+  for (auto [number, next] : llvm::enumerate(loop.getYieldOp().getResults()))
+    if (number != result.number)
+      refuse(result, made(next, loop),
              "this value goes from one iteration to the next; compute it from "
              "the pixel");
   for (auto [after, value] :
        llvm::zip(loop.getAfterArguments(), loop.getConditionOp().getArgs()))
     if (after != result.counter && !after.use_empty())
-      refuse(value.getDefiningOp() ? value.getDefiningOp() : loop,
+      refuse(result, made(value, loop),
              "this value is found by the test of the loop");
   for (Value value : loop.getResults())
     if (!value.use_empty())
-      refuse(*value.getUsers().begin(),
+      refuse(result, *value.getUsers().begin(),
              "this reads, after the loop, what its last iteration left");
   for (Operation &op : loop.getBeforeBody()->without_terminator())
     if (!isPure(&op))
-      refuse(&op, "this is done by the test of the loop");
+      refuse(result, &op, "this is done by the test of the loop");
 }
 
-static bool findCountedWhile(scf::WhileOp loop, CountedLoop &result) {
-  result.op = loop;
-  result.body = loop.getAfterBody();
-  BlockArgument before;
-  if (!addBounds(loop.getConditionOp().getCondition(), before, result))
-    return false;
-  for (auto [after, value] :
-       llvm::zip(loop.getAfterArguments(), loop.getConditionOp().getArgs()))
-    if (value == before)
-      result.counter = after;
-  APInt step;
-  unsigned number = before.getArgNumber();
-  if (!result.counter || !before.getType().isInteger(32) ||
-      !isStep(loop.getYieldOp().getResults()[number], result.counter, step))
-    return false;
-  result.lower = loop.getInits()[number];
-  findCarried(loop, before, result);
-  if (!step.isOne() && !result.refusal.at)
-    result.refusal = {loop.getYieldOp().getResults()[number].getDefiningOp(),
-                      step.isNegative() ? "it counts down"
-                                        : "it leaves pixels out"};
-  return true;
-}
-
-static bool findCountedFor(scf::ForOp loop, CountedLoop &result) {
-  if (!loop.getInductionVar().getType().isInteger(32) || loop.getUnsignedCmp())
-    return false;
-  result.op = loop;
-  result.body = loop.getBody();
-  result.counter = loop.getInductionVar();
-  result.lower = loop.getLowerBound();
-  result.uppers.push_back({LoopBound::Exclusive, loop.getUpperBound(), loop});
-  if (loop.getNumResults())
-    result.refusal = {loop, "a value goes from one iteration to the next; "
-                            "compute it from the pixel"};
-  else if (!matchPattern(loop.getStep(), m_One()))
-    result.refusal = {loop, "it leaves pixels out"};
-  return true;
-}
-
-static bool findCounted(Operation *op, CountedLoop &result) {
-  if (auto loop = dyn_cast<scf::WhileOp>(op))
-    return findCountedWhile(loop, result);
-  auto loop = dyn_cast<scf::ForOp>(op);
-  return loop && findCountedFor(loop, result);
+static std::optional<LoopOverPixels> findLoopOverPixels(Operation *op) {
+  using P = arith::CmpIPredicate;
+  std::optional<CountedLoop> counted = op ? findCountedLoop(op) : std::nullopt;
+  if (!counted || !counted->counter.getType().isInteger(32))
+    return std::nullopt;
+  LoopOverPixels result{*counted, {}};
+  for (const CountedLoop::Bound &bound : result.bounds) {
+    if (llvm::is_contained({P::sgt, P::sge}, bound.predicate))
+      refuse(result, bound.at, "it counts down");
+    else if (!llvm::is_contained({P::slt, P::sle, P::ne}, bound.predicate))
+      return std::nullopt;
+  }
+  if (auto repeated = dyn_cast<scf::WhileOp>(op))
+    refuseCarried(repeated, result);
+  else if (op->getNumResults())
+    refuse(result, op,
+           "a value goes from one iteration to the next; compute "
+           "it from the pixel");
+  if (!result.isByOne())
+    refuse(result, result.getNext() ? result.getNext() : op,
+           result.step && result.step->isNegative() ? "it counts down"
+                                                    : "it leaves pixels out");
+  return result;
 }
 
 /// The one loop in a block that is not in another one, or null.
@@ -178,12 +102,12 @@ bool PixelLoops::find(Operation *outer, int64_t rank) {
   for (int64_t i = 0; i < rank; ++i) {
     if (i)
       at = findOnlyLoop(loops.front().body);
-    CountedLoop loop;
-    if (!at || !findCounted(at, loop))
+    std::optional<LoopOverPixels> loop = findLoopOverPixels(at);
+    if (!loop)
       return false;
-    if (loop.refusal.at && !refusal.at)
-      refusal = loop.refusal;
-    loops.insert(loops.begin(), loop);
+    if (loop->refusal.at && !refusal.at)
+      refusal = loop->refusal;
+    loops.insert(loops.begin(), *loop);
   }
   checkSpine();
   checkBounds();
@@ -194,7 +118,7 @@ bool PixelLoops::find(Operation *outer, int64_t rank) {
 /// more often, but not where it would not have been.
 void PixelLoops::checkSpine() {
   for (unsigned dim = 1; dim < loops.size(); ++dim) {
-    Operation *inner = loops[dim - 1].op;
+    Operation *inner = loops[dim - 1].loop;
     if (inner->getBlock() != loops[dim].body)
       refuse(inner->getParentOp(), "a row is left out here");
     for (Operation &op : loops[dim].body->without_terminator()) {
@@ -208,7 +132,7 @@ void PixelLoops::checkSpine() {
 
 bool PixelLoops::collectInvariant(Value value,
                                   SetVector<Operation *> &slice) const {
-  Operation *op = value.getDefiningOp(), *outer = getOuter().op;
+  Operation *op = value.getDefiningOp(), *outer = getOuter().loop;
   if (!op)
     return !outer->isAncestor(value.getParentBlock()->getParentOp());
   if (!outer->isProperAncestor(op) || slice.contains(op))
@@ -223,12 +147,12 @@ bool PixelLoops::collectInvariant(Value value,
 }
 
 void PixelLoops::checkBounds() {
-  for (const CountedLoop &loop : loops) {
+  for (const LoopOverPixels &loop : loops) {
     SetVector<Operation *> slice;
-    if (!collectInvariant(loop.lower, slice))
-      refuse(loop.op, "its first pixel differs from row to row");
-    for (const LoopBound &bound : loop.uppers)
-      if (!collectInvariant(bound.value, slice))
+    if (!collectInvariant(loop.first, slice))
+      refuse(loop.loop, "its first pixel differs from row to row");
+    for (const CountedLoop::Bound &bound : loop.bounds)
+      if (!collectInvariant(bound.end, slice))
         refuse(bound.at, "this bound differs from row to row");
   }
 }
@@ -320,7 +244,7 @@ Refusal PixelLoops::checkAccess(Operation *op) const {
 Refusal PixelLoops::checkArray(Operation *op, Value array) const {
   Operation *owner = array.getDefiningOp();
   bool isOwn = isa_and_nonnull<memref::AllocaOp>(owner) &&
-               getOuter().op->isProperAncestor(owner);
+               getOuter().loop->isProperAncestor(owner);
   if (isOwn || !stored.contains(array))
     return {};
   return {op, "this uses an array that iterations share and store to"};

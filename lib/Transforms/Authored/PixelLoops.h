@@ -6,6 +6,7 @@
 #define PIKO_LIB_TRANSFORMS_PIXELLOOPS_H
 
 #include "Piko/Analysis/BinIdentity.h"
+#include "Piko/Analysis/CountedLoop.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
 #include "mlir/Dialect/SCF/IR/SCF.h"
@@ -13,20 +14,9 @@
 
 namespace piko {
 
-/// Where a counter ends: below the value, at it, or when it is met.
-struct LoopBound {
-  enum Kind { Exclusive, Inclusive, Unequal } kind;
-  mlir::Value value;
-  mlir::Operation *at; ///< the comparison
-};
-
-/// A loop whose counter rises by 1, and perhaps hands on other values.
-struct CountedLoop {
-  mlir::Operation *op = nullptr;
-  mlir::Block *body = nullptr;
-  mlir::Value counter, lower;
-  llvm::SmallVector<LoopBound, 2> uppers;
-  Refusal refusal; ///< why it is not as simple as that
+/// A loop of a nest over pixels.
+struct LoopOverPixels : CountedLoop {
+  Refusal refusal; ///< Why it is not as simple as that.
 };
 
 /// The number that is made one of at least 32 bits by sign.
@@ -43,9 +33,9 @@ public:
 
   unsigned getRank() const { return loops.size(); }
   /// x is the innermost.
-  const CountedLoop &getLoop(unsigned dim) const { return loops[dim]; }
-  llvm::ArrayRef<CountedLoop> getLoops() const { return loops; }
-  const CountedLoop &getOuter() const { return loops.back(); }
+  const LoopOverPixels &getLoop(unsigned dim) const { return loops[dim]; }
+  llvm::ArrayRef<LoopOverPixels> getLoops() const { return loops; }
+  const LoopOverPixels &getOuter() const { return loops.back(); }
   mlir::Value getCounter(unsigned dim) const { return loops[dim].counter; }
   mlir::Block *getBody() const { return loops.front().body; }
 
@@ -73,7 +63,7 @@ private:
       refusal = {at, why.str()};
   }
 
-  llvm::SmallVector<CountedLoop, 2> loops; // x first
+  llvm::SmallVector<LoopOverPixels, 2> loops; // x first
   Refusal refusal;
   /// State that iterations change, and arrays that they store to.
   llvm::DenseMap<mlir::StringAttr, mlir::Operation *> changed;

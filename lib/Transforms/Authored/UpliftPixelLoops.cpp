@@ -43,8 +43,8 @@ struct UpliftPixelLoopsPass
 class Uplift {
 public:
   Uplift(PixelLoops &loops, bool clips)
-      : loops(loops), clips(clips), builder(loops.getOuter().op),
-        loc(loops.getOuter().op->getLoc()) {}
+      : loops(loops), clips(clips), builder(loops.getOuter().loop),
+        loc(loops.getOuter().loop->getLoc()) {}
   ParallelPixelsOp run();
 
 private:
@@ -80,12 +80,12 @@ static bool isInBin(const PixelLoops &loops, Operation *at,
 
 /// A bound that a counter ends at only if it meets it, and may have passed.
 static Refusal findPassed(const PixelLoops &loops, FactsProvider &provider) {
-  for (const CountedLoop &loop : loops.getLoops())
-    for (const LoopBound &bound : loop.uppers) {
-      if (bound.kind != LoopBound::Unequal)
+  for (const LoopOverPixels &loop : loops.getLoops())
+    for (const CountedLoop::Bound &bound : loop.bounds) {
+      if (bound.predicate != arith::CmpIPredicate::ne)
         continue;
-      LinearFacts facts(loop.op, provider);
-      if (!facts.isAtLeastZero(facts.get(bound.value) - facts.get(loop.lower)))
+      LinearFacts facts(loop.loop, provider);
+      if (!facts.isAtLeastZero(facts.get(bound.end) - facts.get(loop.first)))
         return {bound.at, "the counter may pass this bound"};
     }
   return {};
@@ -100,7 +100,7 @@ Value Uplift::hoist(Value bound) {
   SetVector<Operation *> slice;
   loops.collectInvariant(bound, slice);
   for (Operation *op : slice)
-    op->moveBefore(loops.getOuter().op);
+    op->moveBefore(loops.getOuter().loop);
   return bound;
 }
 
@@ -115,7 +115,7 @@ Value Uplift::createCorner(bool isUpper, unsigned dim) {
 }
 
 Value Uplift::createLower(unsigned dim) {
-  Value lower = hoist(loops.getLoop(dim).lower);
+  Value lower = hoist(loops.getLoop(dim).first);
   if (!clips)
     return lower;
   return arith::MaxSIOp::create(builder, loc, lower,
@@ -139,12 +139,12 @@ Value Uplift::createEnd(Value last, bool isOnly, Value inBin) {
 
 /// The least of the bounds.
 Value Uplift::createUpper(unsigned dim) {
-  ArrayRef<LoopBound> bounds = loops.getLoop(dim).uppers;
+  ArrayRef<CountedLoop::Bound> bounds = loops.getLoop(dim).bounds;
   Value inBin = clips ? createCorner(/*isUpper=*/true, dim) : Value();
   Value result = inBin;
-  for (const LoopBound &bound : bounds) {
-    Value end = hoist(bound.value);
-    if (bound.kind == LoopBound::Inclusive)
+  for (const CountedLoop::Bound &bound : bounds) {
+    Value end = hoist(bound.end);
+    if (bound.predicate == arith::CmpIPredicate::sle)
       end = createEnd(end, bounds.size() == 1, inBin);
     if (result)
       end = arith::MinSIOp::create(builder, loc, result, end);
@@ -169,7 +169,7 @@ ParallelPixelsOp Uplift::run() {
   // From the outside in: what stands before the inner loop. After it are
   // only the steps to the next iteration.
   for (unsigned dim = loops.getRank(); dim-- > 0;) {
-    Operation *inner = dim ? loops.getLoop(dim - 1).op : nullptr;
+    Operation *inner = dim ? loops.getLoop(dim - 1).loop : nullptr;
     for (Operation &op : llvm::make_early_inc_range(
              loops.getLoop(dim).body->without_terminator())) {
       if (&op == inner)
@@ -179,7 +179,7 @@ ParallelPixelsOp Uplift::run() {
   }
   builder.setInsertionPointToEnd(body);
   YieldOp::create(builder, loc, ValueRange(), ValueRange());
-  loops.getOuter().op->erase();
+  loops.getOuter().loop->erase();
   return pixels;
 }
 

@@ -16,50 +16,24 @@ using Predicate = arith::CmpIPredicate;
 
 /// Whether a loop that counts up by one goes on while it is less than a number
 /// that it does not change.
-static bool isLess(arith::CmpIOp compare, Value first) {
-  if (compare.getPredicate() == Predicate::slt)
+static bool isLess(const CountedLoop::Bound &bound, Value first) {
+  if (bound.predicate == Predicate::slt)
     return true;
   // From a number that is known to one that is not below it, as signed ones.
   APInt least, greatest;
   if (!matchPattern(first, m_ConstantInt(&least)) ||
-      !matchPattern(compare.getRhs(), m_ConstantInt(&greatest)) ||
-      least.sgt(greatest))
+      !matchPattern(bound.end, m_ConstantInt(&greatest)) || least.sgt(greatest))
     return false;
-  return compare.getPredicate() == Predicate::ne ||
-         (compare.getPredicate() == Predicate::ult && least.isNonNegative());
-}
-
-static std::optional<LoopCount> findLoopCount(scf::WhileOp loop) {
-  auto compare =
-      loop.getConditionOp().getCondition().getDefiningOp<arith::CmpIOp>();
-  if (!compare ||
-      loop->isAncestor(compare.getRhs().getParentBlock()->getParentOp()))
-    return {};
-  auto before = dyn_cast<BlockArgument>(compare.getLhs());
-  if (!before || before.getOwner() != loop.getBeforeBody())
-    return {};
-  unsigned i = before.getArgNumber();
-  if (!isLess(compare, loop.getInits()[i]))
-    return {};
-  auto step = loop.getYieldOp().getResults()[i].getDefiningOp<arith::AddIOp>();
-  if (!step || !matchPattern(step.getRhs(), m_One()))
-    return {};
-  auto after = dyn_cast<BlockArgument>(step.getLhs());
-  if (!after || after.getOwner() != loop.getAfterBody() ||
-      loop.getConditionOp().getArgs()[after.getArgNumber()] != before)
-    return {};
-  return LoopCount{after, loop.getInits()[i], compare.getRhs()};
+  return bound.predicate == Predicate::ne ||
+         (bound.predicate == Predicate::ult && least.isNonNegative());
 }
 
 std::optional<LoopCount> piko::findLoopCount(LoopLikeOpInterface loop) {
-  if (auto repeat = dyn_cast<scf::WhileOp>(loop.getOperation()))
-    return ::findLoopCount(repeat);
-  auto range = dyn_cast<scf::ForOp>(loop.getOperation());
-  if (!range || !matchPattern(range.getStep(), m_One()) ||
-      range.getUnsignedCmp())
+  std::optional<CountedLoop> counted = findCountedLoop(loop);
+  const CountedLoop::Bound *bound = counted ? counted->getBound() : nullptr;
+  if (!bound || !counted->isByOne() || !isLess(*bound, counted->first))
     return {};
-  return LoopCount{range.getInductionVar(), range.getLowerBound(),
-                   range.getUpperBound()};
+  return LoopCount{counted->counter, counted->first, bound->end};
 }
 
 //===----------------------------------------------------------------------===//

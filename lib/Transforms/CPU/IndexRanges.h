@@ -6,11 +6,9 @@
 #ifndef PIKO_LIB_TRANSFORMS_INDEXRANGES_H
 #define PIKO_LIB_TRANSFORMS_INDEXRANGES_H
 
+#include "Piko/Analysis/CountedLoop.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
-#include "mlir/Dialect/Arith/IR/Arith.h"
-#include "mlir/Dialect/SCF/IR/SCF.h"
-#include "mlir/Interfaces/LoopLikeInterface.h"
 #include "llvm/ADT/DenseMap.h"
 
 namespace piko {

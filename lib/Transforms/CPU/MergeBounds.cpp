@@ -3,6 +3,7 @@
 // piko-merge-bounds: fields of one element are read, or written, under one
 // test of its index.
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Transforms/Passes.h"
 #include "Support/StateAccess.h"
 
@@ -56,7 +57,6 @@ static LoadOp getGuarded(scf::IfOp test) {
 /// Whether a field shares its cache line with the rest of its record, so that
 /// it costs little to read it along.
 static bool isShort(LoadOp load) {
-  constexpr int64_t lineSize = 64;
   Operation *state = lookupInPipeline<Operation *>(load, load.getStateAttr());
   RecordOp record = lookupRecord(state, getStateRecord(state));
   return record && record.getSize() <= lineSize;

@@ -16,6 +16,7 @@
 
 #include "Support/StateAccess.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -214,7 +215,6 @@ Value RowPrefetcher::clone(Value value, OpBuilder &builder,
 /// pixels read at their own place for the second level, and of what that refers
 /// to all that leads there for the third. None of it may be empty.
 Value RowPrefetcher::isWorthwhile(const Stage &stage, OpBuilder &builder) {
-  constexpr int64_t nearBytes = 4 << 20, ownBytes = 1 << 20;
   CodeBuilder at(builder, pixels.getLoc());
   Value worthwhile;
   auto require = [&](Attribute state, int64_t least) {
@@ -229,7 +229,7 @@ Value RowPrefetcher::isWorthwhile(const Stage &stage, OpBuilder &builder) {
     Value isLarge = at.compare(CodeBuilder::P::uge, count, at.index(least));
     worthwhile = worthwhile ? at.both(worthwhile, isLarge) : isLarge;
   };
-  int64_t bytes = stage.first == 0 ? ownBytes : nearBytes;
+  int64_t bytes = stage.first == 0 ? secondLevelBytes : thirdLevelBytes;
   for (const auto &[other, references] : stages)
     if (other == stage) {
       RecordOp record = lookupRecord(

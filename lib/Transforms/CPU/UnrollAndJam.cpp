@@ -47,6 +47,7 @@ struct Counting {
   LoopLikeOpInterface loop;
   LoopCount count;
   Block *body;
+  Operation *next; ///< What makes the next count, in an scf.while.
 };
 
 /// An access to state, or to an array of the phase, inside of the inner loop.
@@ -115,30 +116,14 @@ private:
 
 /// A loop that hands on nothing but its count.
 static std::optional<Counting> findCounting(Operation *op) {
-  auto loop = dyn_cast<LoopLikeOpInterface>(op);
-  std::optional<LoopCount> count;
-  if (loop && op->getNumResults() <= 1)
-    count = findLoopCount(loop);
+  std::optional<CountedLoop> counted = findCountedLoop(op);
+  if (!counted || !counted->onlyCompares() ||
+      op->getNumResults() != (isa<scf::WhileOp>(op) ? 1 : 0))
+    return {};
+  std::optional<LoopCount> count = findLoopCount(counted->loop);
   if (!count)
     return {};
-  if (auto range = dyn_cast<scf::ForOp>(op)) {
-    if (range.getNumResults() != 0)
-      return {};
-    return Counting{loop, *count, range.getBody()};
-  }
-  auto repeat = dyn_cast<scf::WhileOp>(op);
-  // The comparison and the condition.
-  if (!repeat || repeat.getInits().size() != 1 || repeat.getNumResults() != 1 ||
-      repeat.getBeforeBody()->getOperations().size() != 2)
-    return {};
-  return Counting{loop, *count, repeat.getAfterBody()};
-}
-
-/// What makes the next count.
-static Operation *getStep(Counting loop) {
-  if (auto repeat = dyn_cast<scf::WhileOp>(loop.loop.getOperation()))
-    return repeat.getYieldOp().getResults()[0].getDefiningOp();
-  return nullptr;
+  return Counting{counted->loop, *count, counted->body, counted->getNext()};
 }
 
 static bool computesNumber(Operation &op) {
@@ -181,7 +166,7 @@ std::optional<Nest> Nest::find(LoopLikeOpInterface loop) {
   std::optional<Counting> inner;
   SmallVector<Operation *> front;
   for (Operation &op : outer->body->without_terminator()) {
-    if (&op == getStep(*outer))
+    if (&op == outer->next)
       continue;
     if (inner)
       return {};
@@ -211,7 +196,7 @@ std::optional<Nest> Nest::find(LoopLikeOpInterface loop) {
 bool Nest::collect() {
   int64_t operations = 0;
   for (Operation &op : inner.body->without_terminator()) {
-    if (&op == getStep(inner))
+    if (&op == inner.next)
       continue;
     ++operations;
     if (std::optional<Access> access = findAccess(&op)) {
@@ -393,7 +378,7 @@ void Nest::cloneInner(OpBuilder &builder, ArrayRef<IRMapping> mappings) {
   Forwarding forwarding;
   for (auto [i, mapping] : llvm::enumerate(copies))
     for (Operation &op : inner.body->without_terminator()) {
-      if (&op == getStep(inner))
+      if (&op == inner.next)
         continue;
       std::optional<Access> access = findAccess(&op);
       bool isStore = access && access->stored;

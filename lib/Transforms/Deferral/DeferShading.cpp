@@ -16,6 +16,7 @@
 
 #include "Deferral/Deferral.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
@@ -104,7 +105,6 @@ void BinDeferral::createArrays() {
   for (int64_t dim = 0; dim < cells.rank(); ++dim)
     first.push_back(cells.lo(bins.getBin(), dim));
   auto createArray = [&](Type type) -> Value {
-    constexpr int64_t lineSize = 64;
     auto array = memref::AllocaOp::create(builder, loc,
                                           MemRefType::get({getPixels()}, type),
                                           builder.getI64IntegerAttr(lineSize));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 
 #include "Piko/Transforms/Storage/Slots.h"
+#include "Piko/Analysis/TargetModel.h"
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -103,7 +104,7 @@ void Slots::finish() {
     return;
   }
   // Each array starts on a line of its own.
-  constexpr int64_t line = 64, mostIterations = int64_t(1) << 40;
+  constexpr int64_t mostIterations = int64_t(1) << 40;
   auto constant = [&](int64_t value) -> Value {
     return arith::ConstantIndexOp::create(builder, loc, value);
   };
@@ -113,8 +114,8 @@ void Slots::finish() {
     array.place->erase();
     Value bytes =
         arith::MulIOp::create(builder, loc, count, constant(array.bytes));
-    bytes = arith::AddIOp::create(builder, loc, bytes, constant(line - 1));
-    bytes = arith::AndIOp::create(builder, loc, bytes, constant(-line));
+    bytes = arith::AddIOp::create(builder, loc, bytes, constant(lineSize - 1));
+    bytes = arith::AndIOp::create(builder, loc, bytes, constant(-lineSize));
     size = arith::AddIOp::create(builder, loc, size, bytes);
   }
   // A product that wraps must not look small: what is negative is refused.

@@ -12,6 +12,7 @@
 #include "Vectorize/Write/IterationWriter.h"
 
 #include "Piko/Analysis/BranchProbability.h"
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
@@ -216,7 +217,6 @@ void Distributor::createTables() {
   llvm::MapVector<Type, SmallVector<Value>> ofType;
   for (Value result : llvm::make_first_range(results))
     ofType[getTableType(result.getType())].push_back(result);
-  constexpr int64_t lineSize = 64;
   for (auto &[type, values] : ofType) {
     auto count = static_cast<int64_t>(values.size());
     arrays.push_back(memref::AllocaOp::create(

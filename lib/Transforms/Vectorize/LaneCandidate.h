@@ -7,14 +7,13 @@
 
 #include "Vectorize/Shape/LaneNests.h"
 
+#include "Piko/Analysis/TargetModel.h"
+
 namespace piko {
 
 /// Whether so many lanes are expected to take less than one, by as much as
 /// estimates may be wrong.
 bool isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount);
-
-/// The number of lanes of vectors that have enough registers for two of each.
-constexpr int64_t widestLanes = 16;
 
 /// Begins a remark at a loop that names its stage.
 mlir::InFlightDiagnostic remarkStage(mlir::scf::ForOp loop);

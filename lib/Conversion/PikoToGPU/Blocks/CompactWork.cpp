@@ -242,7 +242,7 @@ Value WorkCompaction::cloneSlice(Emitter &b, Value value, IRMapping &mapping,
 
 /// The class of the loop's length; null where that is not known.
 Value WorkCompaction::createClass(Emitter &b) {
-  std::optional<NestLoop> outer = matchCountedLoop(anchor);
+  std::optional<NestLoop> outer = findNestLoop(anchor);
   if (!outer)
     return {};
   std::optional<NestLoop> inner = matchInnerLoop(*outer);

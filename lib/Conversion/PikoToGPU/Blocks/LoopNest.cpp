@@ -3,34 +3,24 @@
 #include "PikoToGPU/Blocks/LoopNest.h"
 
 #include "mlir/IR/IRMapping.h"
-#include "mlir/IR/Matchers.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
 
 using namespace mlir;
 using namespace piko;
 
-std::optional<NestLoop> piko::matchCountedLoop(Operation *op) {
-  auto loop = dyn_cast<scf::WhileOp>(op);
-  if (!loop || loop.getNumOperands() != 1 || loop.getNumResults() != 1)
-    return std::nullopt;
-  Block &before = *loop.getBeforeBody();
-  Value now = before.getArgument(0);
-  auto condition = loop.getConditionOp();
-  auto test = condition.getCondition().getDefiningOp<arith::CmpIOp>();
+std::optional<NestLoop> piko::findNestLoop(Operation *op) {
   using Predicate = arith::CmpIPredicate;
-  if (!test || test->getBlock() != &before || &before.front() != test ||
-      test->getNextNode() != condition || condition.getArgs()[0] != now ||
-      test.getLhs() != now || !loop.isDefinedOutsideOfLoop(test.getRhs()) ||
+  auto loop = dyn_cast<scf::WhileOp>(op);
+  std::optional<CountedLoop> counted =
+      loop ? findCountedLoop(op) : std::nullopt;
+  const CountedLoop::Bound *bound = counted ? counted->getBound() : nullptr;
+  if (!bound || !counted->isByOne() || !counted->onlyCompares() ||
+      loop.getNumResults() != 1 ||
       !llvm::is_contained(
           {Predicate::slt, Predicate::sle, Predicate::ult, Predicate::ule},
-          test.getPredicate()))
+          bound->predicate))
     return std::nullopt;
-  auto next = loop.getYieldOp().getOperand(0).getDefiningOp<arith::AddIOp>();
-  if (!next || next->getBlock() != loop.getAfterBody() ||
-      next.getLhs() != loop.getAfterArguments()[0] ||
-      !matchPattern(next.getRhs(), m_One()))
-    return std::nullopt;
-  return NestLoop{loop, loop.getOperand(0), test.getRhs(), test.getPredicate()};
+  return NestLoop{loop, counted->first, bound->end, bound->predicate};
 }
 
 std::optional<NestLoop> piko::matchInnerLoop(NestLoop outer) {
@@ -40,7 +30,7 @@ std::optional<NestLoop> piko::matchInnerLoop(NestLoop outer) {
       continue;
     if (inner || !op.use_empty())
       return std::nullopt;
-    inner = matchCountedLoop(&op);
+    inner = findNestLoop(&op);
     if (!inner)
       return std::nullopt;
   }
@@ -51,7 +41,7 @@ std::optional<NestLoop> piko::matchInnerLoop(NestLoop outer) {
 }
 
 void piko::coalesceLoops(Operation *op) {
-  std::optional<NestLoop> outer = matchCountedLoop(op);
+  std::optional<NestLoop> outer = findNestLoop(op);
   std::optional<NestLoop> inner = outer ? matchInnerLoop(*outer) : std::nullopt;
   if (!inner || !op->use_empty())
     return;

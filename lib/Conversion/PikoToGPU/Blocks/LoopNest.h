@@ -5,8 +5,7 @@
 #ifndef PIKO_LIB_CONVERSION_PIKOTOGPU_BLOCKS_LOOPNEST_H
 #define PIKO_LIB_CONVERSION_PIKOTOGPU_BLOCKS_LOOPNEST_H
 
-#include "mlir/Dialect/Arith/IR/Arith.h"
-#include "mlir/Dialect/SCF/IR/SCF.h"
+#include "Piko/Analysis/CountedLoop.h"
 
 namespace piko {
 
@@ -24,7 +23,7 @@ struct NestLoop {
   mlir::Block *body() { return loop.getAfterBody(); }
 };
 
-std::optional<NestLoop> matchCountedLoop(mlir::Operation *op);
+std::optional<NestLoop> findNestLoop(mlir::Operation *op);
 
 /// The loop in another one that has nothing else with an effect in it, and
 /// counts from and to the same in each of its iterations.

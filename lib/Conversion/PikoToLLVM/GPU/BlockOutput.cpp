@@ -12,12 +12,12 @@
 #include "PikoToLLVM/GPU/GridCode.h"
 #include "PikoToLLVM/GPU/GridLog.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
 using namespace mlir;
 using namespace piko;
 
-static constexpr int64_t warpSize = 32;
 /// After the numbers of warps: what one thread tells the others.
 static constexpr int64_t told = warpSize;
 

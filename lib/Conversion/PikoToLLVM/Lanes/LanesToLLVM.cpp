@@ -8,6 +8,7 @@
 #include "PikoToLLVM/Records/RecordPieces.h"
 #include "PikoToLLVM/Records/RecordRows.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Conversion/Permutations.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
@@ -254,8 +255,7 @@ struct LaneItemsLowering : Lowering<LaneItemsOp> {
     CodeBuilder at(builder, loc);
     Value first =
         at.mul(toI64(builder, loc, position), createI64(builder, loc, size));
-    constexpr int64_t line = 64;
-    for (int64_t i = 0; i < lanes * size; i += line) {
+    for (int64_t i = 0; i < lanes * size; i += lineSize) {
       Value offset = at.add(
           first, createI64(builder, loc, vectorsAhead * lanes * size + i));
       createPrefetch(builder, loc, createOffset(builder, loc, items, offset),

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Passes/CompressStores.h"
 
+#include "Piko/Analysis/TargetModel.h"
+
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicInst.h"
 
 using namespace llvm;
-
-static constexpr unsigned registerBits = 512;
+using namespace piko;
 
 /// Stores some lanes one after the other, and gives back where the next ones
 /// go.
@@ -37,7 +38,7 @@ static void expand(IntrinsicInst *store) {
         *mask = store->getArgOperand(2);
   auto *type = cast<FixedVectorType>(lanes->getType());
   int count = type->getNumElements(),
-      most = registerBits / type->getScalarSizeInBits();
+      most = widestVectorBits / type->getScalarSizeInBits();
   for (int begin = 0; begin < count; begin += most) {
     SmallVector<int> part;
     for (int lane = begin; lane < std::min(count, begin + most); ++lane)

@@ -9,6 +9,7 @@
 // and interleaved. So are primitives at consecutive positions loaded, where
 // bins have no order of their own: hence one field of them is enough.
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Transforms/Passes.h"
 #include "Support/StateAccess.h"
 
@@ -107,7 +108,6 @@ template <typename OpT> static bool isAfter(OpT read, OpT first) {
 /// What lanes read in a condition is read before it as well where its
 /// record is as short as a line of the cache.
 static bool isNear(GatherOp read, GatherOp first, RecordOp record) {
-  constexpr int64_t lineSize = 64;
   return read->getBlock() == first->getBlock() || record.getSize() <= lineSize;
 }
 

@@ -5,24 +5,15 @@
 #ifndef PIKO_LIB_TRANSFORMS_COUNTEDWHILES_H
 #define PIKO_LIB_TRANSFORMS_COUNTEDWHILES_H
 
-#include "mlir/Dialect/SCF/IR/SCF.h"
-
-#include <optional>
+#include "Piko/Analysis/CountedLoop.h"
 
 namespace piko {
 
-/// How a loop counts by one: which of its variables, below which bound, and
-/// whether it takes the bound as well.
-struct CountedWhile {
-  unsigned variable = 0;
-  mlir::Value bound;
-  bool isClosed = false;
-};
+/// A loop that an scf.for can count in 64 bits: by one, up to a number or below
+/// it.
+std::optional<CountedLoop> findCountedWhile(mlir::scf::WhileOp loop);
 
-std::optional<CountedWhile> findCountedWhile(mlir::scf::WhileOp loop);
-
-mlir::scf::ForOp countLoop(mlir::scf::WhileOp loop,
-                           const CountedWhile &counting);
+mlir::scf::ForOp countLoop(mlir::scf::WhileOp loop, const CountedLoop &counted);
 
 /// Makes loops that count of those inside of which one knows how often they
 /// iterate, in 64 bits.

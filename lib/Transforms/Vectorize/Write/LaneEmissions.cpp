@@ -14,6 +14,7 @@
 
 #include "Vectorize/Write/LaneTurns.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -77,7 +78,7 @@ void LaneTurns::writeEmissions(const PortEmissions &port) {
 
 Value LaneTurns::writeRecords(AppendOp append) {
   FlatSymbolRefAttr name = append.getPrim().getType().getRecord();
-  constexpr int64_t lineSize = 64, pieceSize = 16;
+  constexpr int64_t pieceSize = 16;
   int64_t size =
       laneCount *
       int64_t(llvm::alignTo(lookupRecord(append, name).getSize(), pieceSize));

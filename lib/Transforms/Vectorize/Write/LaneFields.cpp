@@ -5,6 +5,7 @@
 
 #include "Vectorize/Write/LaneMemory.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -106,7 +107,6 @@ void LaneMemory::writeFields(ArrayRef<LoadOp> loads) {
 
 /// An element for each lane, and of a row each line of the cache.
 void LaneMemory::writePrefetch(PrefetchOp prefetch) {
-  constexpr int64_t lineSize = 64;
   SmallVector<Value> places = getPlaces(prefetch.getIndices());
   bool isRow = isRowOf(prefetch.getIndices());
   int64_t step = laneCount;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Vectorize/Write/LaneMemory.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -18,7 +19,6 @@ void LaneMemory::writePrivate(memref::AllocaOp array) {
     arrays.clone(*array, scalars);
     return;
   }
-  constexpr int64_t lineSize = 64;
   columns[array] = memref::AllocaOp::create(
       arrays, loc,
       MemRefType::get({type.getNumElements() * laneCount},

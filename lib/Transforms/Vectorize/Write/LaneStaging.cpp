@@ -10,6 +10,8 @@
 
 #include "Vectorize/Write/LaneMemory.h"
 
+#include "Piko/Analysis/TargetModel.h"
+
 #include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 
@@ -46,7 +48,6 @@ LaneMemory::Staged &LaneMemory::getStaged(AtomicOp atomic) {
   if (list.count)
     return list;
   OpBuilder arrays(outermost);
-  constexpr int64_t lineSize = 64;
   auto allocate = [&](int64_t size, Type type) -> Value {
     return memref::AllocaOp::create(arrays, loc, MemRefType::get({size}, type),
                                     arrays.getI64IntegerAttr(lineSize));

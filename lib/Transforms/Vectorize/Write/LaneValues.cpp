@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Vectorize/Write/LaneValues.h"
 
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -147,7 +148,6 @@ static Type getSlotType(Type type) {
 
 Value LaneValues::createSlot(Type type) {
   OpBuilder arrays(outermost);
-  constexpr int64_t lineSize = 64;
   return memref::AllocaOp::create(
       arrays, loc, MemRefType::get({laneCount}, getSlotType(type)),
       arrays.getI64IntegerAttr(lineSize));
