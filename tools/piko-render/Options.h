@@ -3,6 +3,7 @@
 #ifndef PIKO_TOOLS_PIKORENDER_OPTIONS_H
 #define PIKO_TOOLS_PIKORENDER_OPTIONS_H
 
+#include "Piko/CommandLine/CommandLine.h"
 #include "Piko/Driver/PipelineLoader.h"
 #include "Piko/Scene/View.h"
 
@@ -11,7 +12,7 @@
 namespace piko::render {
 
 struct Options {
-  bool help = false;
+  std::string help; ///< the text, if that is asked for
   std::string pipeline, scene;
   std::string sceneOption; ///< the first one that only scenes have
   LoadOptions load;
@@ -37,7 +38,12 @@ struct Options {
   bool json = false, kernelTimes = false;
 };
 
-extern const char *const usage;
+/// Those of what is rendered, and how it is seen and run, which piko-tune has,
+/// too.
+void addSceneOptions(CommandLine &line, Options &options);
+
+/// Whether what was read is fine together; returns what is wrong, or nothing.
+std::string checkOptions(const CommandLine &line, Options &options);
 
 /// Reads the command line, without the program's name.
 Result<Options> parseOptions(const std::vector<std::string> &words);

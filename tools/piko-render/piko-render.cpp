@@ -308,8 +308,8 @@ int main(int argc, char **argv) {
   auto options = parseOptions({argv + 1, argv + argc});
   if (!options)
     return fail(options.error());
-  if (options->help) {
-    std::fputs(usage, stdout);
+  if (!options->help.empty()) {
+    std::fputs(options->help.c_str(), stdout);
     auto ok = support::finishOutput();
     return ok ? 0 : fail(ok.error());
   }

@@ -15,7 +15,7 @@ namespace piko::tune {
 enum class Metric { Max, Mean, RMS, P99, FLIP };
 
 struct TuneOptions {
-  bool help = false;
+  std::string help;               ///< the text, if that is asked for
   render::Options render;         ///< the file, the scene, and how it is seen
   std::vector<std::string> pipes; ///< to choose from; empty = the only one
   std::string errorText = "1/255";
@@ -31,8 +31,6 @@ struct TuneOptions {
   bool exhaustive = false, json = false;
   std::string out, chart, csv; ///< files to write
 };
-
-extern const char *const usage;
 
 /// Reads the command line, without the program's name.
 render::Result<TuneOptions>

@@ -65,7 +65,7 @@ TEST(TuneOptions, Standard) {
   EXPECT_EQ(o->metric, Metric::Max);
   EXPECT_FALSE(o->space.contains("strips"));
   EXPECT_TRUE(o->space.contains("numbers"));
-  EXPECT_TRUE(parseTuneOptions({"--help"})->help);
+  EXPECT_FALSE(parseTuneOptions({"--help"})->help.empty());
 }
 
 } // namespace
