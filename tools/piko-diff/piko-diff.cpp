@@ -1,5 +1,6 @@
 //===- piko-diff.cpp - Measure how far images are from another one --------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#include "Piko/CommandLine/CommandLine.h"
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/Json.h"
@@ -7,7 +8,6 @@
 #include "Piko/Support/OutputFile.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -15,74 +15,45 @@
 using namespace piko;
 using namespace piko::render;
 
-static const char *const usage =
-    R"(usage: piko-diff [options] REFERENCE IMAGE
-
-Measures how far an image is from another one, in r, g and b as a display shows
-them: the largest, the mean and the root mean square absolute difference, the
-99th percentile of pixels, PSNR in dB, and the mean of FLIP, which predicts what
-an observer notices. Black to white is 1. Colours are taken as the files have
-them; alpha is not compared.
-
-  --map FILE             write FLIP of each pixel, from black (equal) by red and
-                         yellow to white
-  --pixels-per-degree P  how finely an observer sees the images (67.02: a display
-                         of 3840 pixels, 0.7 m wide, from 0.7 m)
-  --json                 print one line of JSON
-  --fail-above E         exit with 1 if the largest difference is above E
-  --help                 print this
-)";
-
 namespace {
 
 struct Options {
-  bool help = false, json = false;
-  std::vector<std::string> files;
-  std::string map;
+  std::string help; ///< the text, if that is asked for
+  bool json = false;
+  std::string reference, image, map;
   double pixelsPerDegree = usualPixelsPerDegree;
   double failAbove = INFINITY;
 };
 
-Result<double> parseNumber(const std::string &name, const std::string &text) {
-  double number = 0;
-  auto [end, problem] =
-      std::from_chars(text.data(), text.data() + text.size(), number);
-  if (problem != std::errc() || end != text.data() + text.size() ||
-      !(number >= 0))
-    return Error{name + ": expected a number of at least 0, but got '" + text +
-                 "'"};
-  return number;
-}
-
 Result<Options> parseOptions(const std::vector<std::string> &words) {
+  CommandLine line(
+      "piko-diff [options] REFERENCE IMAGE",
+      "Measures how far an image is from another one, in r, g and b as a "
+      "display shows them: the largest, the mean and the root mean square "
+      "absolute difference, the 99th percentile of pixels, PSNR in dB, and the "
+      "mean of FLIP, which predicts what an observer notices. Black to white "
+      "is 1. Colours are taken as the files have them; alpha is not compared.");
   Options options;
-  for (size_t i = 0; i < words.size(); ++i) {
-    const std::string &word = words[i];
-    bool takesValue = word == "--map" || word == "--pixels-per-degree" ||
-                      word == "--fail-above";
-    if (takesValue && i + 1 == words.size())
-      return Error{"option '" + word + "' lacks its value"};
-    if (word == "--help") {
-      options.help = true;
-    } else if (word == "--json") {
-      options.json = true;
-    } else if (word == "--map") {
-      options.map = words[++i];
-    } else if (takesValue) {
-      auto number = parseNumber(word, words[++i]);
-      if (!number)
-        return number.error();
-      (word == "--fail-above" ? options.failAbove : options.pixelsPerDegree) =
-          *number;
-    } else if (word.size() > 1 && word[0] == '-') {
-      return Error{"unknown option '" + word + "'"};
-    } else {
-      options.files.push_back(word);
-    }
-  }
-  if (!options.help && options.files.size() != 2)
-    return Error{"expected two images, but got " +
-                 std::to_string(options.files.size())};
+  CLI::Option *files[] = {
+      line.addText("REFERENCE", "", options.reference, "what is right"),
+      line.addText("IMAGE", "", options.image, "what is measured")};
+  line.addText("--map", "FILE", options.map,
+               "write FLIP of each pixel, from black (equal) by red and yellow "
+               "to white");
+  line.addNumber("--pixels-per-degree", "P", options.pixelsPerDegree,
+                 "how finely an observer sees the images (67.02: a display of "
+                 "3840 pixels, 0.7 m wide, from 0.7 m)",
+                 0);
+  line.add_flag("--json", options.json, "print one line of JSON");
+  line.addNumber("--fail-above", "E", options.failAbove,
+                 "exit with 1 if the largest difference is above E", 0);
+  auto help = line.read(words);
+  if (!help)
+    return help.error();
+  options.help = *help;
+  size_t count = files[0]->count() + files[1]->count();
+  if (options.help.empty() && count != 2)
+    return Error{"expected two images, but got " + std::to_string(count)};
   return options;
 }
 
@@ -131,17 +102,17 @@ Result<bool> compareFiles(const Options &options) {
   if (!options.map.empty())
     if (auto ok = checkImageFormat(options.map); !ok)
       return ok.error();
-  auto reference = readImage(options.files[0]);
+  auto reference = readImage(options.reference);
   if (!reference)
     return reference.error();
-  auto image = readImage(options.files[1]);
+  auto image = readImage(options.image);
   if (!image)
     return image.error();
   std::vector<float> flip;
   auto error =
       compareImages(*reference, *image, options.pixelsPerDegree, &flip);
   if (!error)
-    return Error{"'" + options.files[0] + "' and '" + options.files[1] +
+    return Error{"'" + options.reference + "' and '" + options.image +
                  "': " + error.error().message};
   if (!options.map.empty())
     if (auto ok = writeMap(options, *image, flip); !ok)
@@ -165,8 +136,8 @@ int main(int argc, char **argv) {
   auto options = parseOptions({argv + 1, argv + argc});
   if (!options)
     return fail(options.error());
-  if (options->help) {
-    std::fputs(usage, stdout);
+  if (!options->help.empty()) {
+    std::fputs(options->help.c_str(), stdout);
     auto ok = support::finishOutput();
     return ok ? 0 : fail(ok.error());
   }
