@@ -2,80 +2,44 @@
 
 #include "Options.h"
 
+#include "Piko/CommandLine/CommandLine.h"
 #include "Piko/Target/Processor.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
+using piko::CommandLine;
+
 namespace {
 
-/// The words of a command line, or of a line of a file of cases.
-class Words {
-public:
-  explicit Words(std::vector<std::string> words) : words(std::move(words)) {}
-
-  bool atEnd() const { return next == words.size(); }
-  const std::string &take() { return words[next++]; }
-
-  /// The values that follow an option.
-  std::vector<std::string> takeValues(const std::string &option, bool several) {
-    std::vector<std::string> values;
-    while (!atEnd() && !isOption(words[next]) && (several || values.empty()))
-      values.push_back(take());
-    if (values.empty())
-      throw std::runtime_error(option + " lacks its value");
-    return values;
-  }
-
-private:
-  static bool isOption(const std::string &word) {
-    return word.rfind("--", 0) == 0 || word.rfind("-O", 0) == 0;
-  }
-
-  std::vector<std::string> words;
-  size_t next = 0;
-};
-
-template <class T> T toNumber(const std::string &value) {
-  T number{};
-  const char *end = value.data() + value.size();
-  auto [after, error] = std::from_chars(value.data(), end, number);
-  if (error != std::errc() || after != end)
-    throw std::runtime_error("expected a number, but got '" + value + "'");
-  return number;
+void addCaseOptions(CommandLine &line, Case &into) {
+  line.addText("--pipe", "NAME", into.pipe,
+               "which pipeline of the file (the only one)");
+  line.addNumbers("--domain", "W H ..", 0, into.domain,
+                  "the domain's size (64 48)");
+  line.addNumbers("--count", "N ..", 0, into.counts,
+                  "primitives of each source; the last number is for all that "
+                  "follow (1000)");
+  line.addNumber("--seed", "S", into.seed, "of the input (1)");
+  line.addNumber("--loop-limit", "N", into.loopLimit,
+                 "of hops and rounds (0, as it is)");
+  line.addNumber("--strip", "N", into.strip,
+                 "primitives of a source in a strip (0, all)");
+  line.addNumber("--budget", "BYTES", into.budget,
+                 "what bins may hold (0, no budget)");
+  line.add_flag("--wide", into.wide,
+                "input of all bits, infinities and NaNs among it");
 }
 
-template <class T> std::vector<T> toNumbers(std::vector<std::string> values) {
-  std::vector<T> numbers;
-  for (const std::string &value : values)
-    numbers.push_back(toNumber<T>(value));
-  return numbers;
-}
-
-/// True if the option was one that a case has.
-bool readCaseOption(const std::string &name, Words &words, Case &into) {
-  if (name == "--pipe")
-    into.pipe = words.takeValues(name, false)[0];
-  else if (name == "--domain")
-    into.domain = toNumbers<int64_t>(words.takeValues(name, true));
-  else if (name == "--count")
-    into.counts = toNumbers<int64_t>(words.takeValues(name, true));
-  else if (name == "--seed")
-    into.seed = toNumbers<unsigned>(words.takeValues(name, false))[0];
-  else if (name == "--loop-limit")
-    into.loopLimit = toNumbers<int64_t>(words.takeValues(name, false))[0];
-  else if (name == "--strip")
-    into.strip = toNumbers<int64_t>(words.takeValues(name, false))[0];
-  else if (name == "--budget")
-    into.budget = toNumbers<int64_t>(words.takeValues(name, false))[0];
-  else if (name == "--wide")
-    into.wide = true;
-  else
-    return false;
-  return true;
+/// Reads words with a command line that throws nothing of CLI11's.
+std::string read(CommandLine &line, const std::vector<std::string> &words) {
+  auto help = line.read(words);
+  if (!help)
+    throw std::runtime_error(help.error().message);
+  return *help;
 }
 
 /// A name of --targets, with the options for a GPU that all of them share.
@@ -121,73 +85,123 @@ std::vector<Target> readTargets(const std::optional<std::string> &names,
 
 } // namespace
 
+/// What to compile, and how.
+static void addCompilerOptions(CommandLine &line, Options &options) {
+  line.addText("FILE", "", options.file, "the pipelines, C++ or .mlir");
+  line.addText("--reference", "FILE", options.reference,
+               "the C++ that the reference executor runs (FILE)");
+  line.addOptional(
+      "--check", "[=nan:RECORD.FIELD,..]",
+      [&](const std::string &text) {
+        auto check = piko::parseCheckOptions(text);
+        if (!check)
+          throw CLI::ValidationError("expected --check[=nan:RECORD.FIELD,..]");
+        options.check = *check;
+      },
+      "checking mode, on both sides");
+  line.addText(
+      "--without", "PASS,..",
+      [&](const std::string &text) {
+        auto synthesis = piko::parseSynthesisOptions(text);
+        if (!synthesis)
+          throw CLI::ValidationError(piko::describeWrongSynthesisOptions(text));
+        options.synthesis.without = synthesis->without;
+      },
+      "passes of synthesis to leave out");
+  line.addNumber(
+      "--mapping-window", "F", options.synthesis.mappingWindow,
+      "hold loops as vectors and as scalar loops where estimates are "
+      "within this factor of each other");
+  line.addText(
+      "-O", "LEVEL",
+      [&](const std::string &level) {
+        if (level.size() != 1 || level[0] < '0' || level[0] > '3')
+          throw CLI::ValidationError("expected -O0 to -O3, but got -O" + level);
+        options.optLevel = level[0] - '0';
+      },
+      "-O0 to -O3: how much LLVM optimizes (-O3 for the first target, -O1 for "
+      "others, -O0 for GPUs)");
+  line.add_flag_callback(
+      "--no-cache", [&] { options.cache.enabled = false; },
+      "compile the reference executor's code anew");
+}
+
+/// What cases run on. `one` is what --target to --gpu-chip say.
+static void addTargetOptions(CommandLine &line, Target &one,
+                             std::optional<std::string> &targets) {
+  line.addText(
+      "--targets", "NAME,..",
+      [&](const std::string &names) { targets = names; },
+      "what each case runs on: cpu, gpu-on-cpu, cuda, or processors by LLVM's "
+      "names");
+  line.addText(
+      "--target", "TARGET",
+      [&](const std::string &name) {
+        auto target = piko::parseGPUTarget(name);
+        if (!target || *target == piko::GPUTarget::Auto)
+          throw CLI::ValidationError(
+              "expected --target cpu, cuda or gpu-on-cpu");
+        one.gpu.target = *target;
+      },
+      "the only target: cpu, gpu-on-cpu or cuda (cpu)");
+  line.addText("--cpu", "NAME", one.cpu, "its processor (native)");
+  line.addNumber("--gpu-threads", "N", one.gpu.threads,
+                 "threads of a block (0, as the stage says)");
+  line.addNumber("--gpu-seed", "N", one.gpu.seed,
+                 "for gpu-on-cpu: permutes the blocks (0, in order)");
+  line.addNumber(
+      "--gpu-blocks", "N", one.gpu.blocks,
+      "for gpu-on-cpu: most blocks of a grid (0, one for each unit)");
+  line.addText(
+      "--gpu-chip", "NAME,..",
+      [&](const std::string &names) {
+        if (!one.gpu.setChips(names))
+          throw CLI::ValidationError("expected --gpu-chip sm_90,..");
+      },
+      "for cuda: PTX for the oldest of these, cubins for each");
+}
+
+/// What is run of a target, and what must come of it.
+static void addRunOptions(CommandLine &line, Options &options) {
+  line.addText("--cases", "FILE", options.cases,
+               "a file with the options of a case in each line, or of C++ in "
+               "each line after '// CASE: '");
+  line.addNumbers("--threads", "T ..", 0, options.threads,
+                  "numbers of threads (1 2 7)");
+  line.addNumber("--runs", "N", options.runs, "of each number (3)");
+  line.addNumber("--timeout", "SECONDS", options.timeout, "of a case (none)");
+  line.addText(
+      "--tolerance", "X",
+      [&](const std::string &text) {
+        options.tolerance =
+            CommandLine::readNumber<double>("--tolerance", text);
+      },
+      "relative differences that stages may have which are not strict (any)");
+  line.add_flag("--stops", options.stops,
+                "all cases must stop, with the same message everywhere");
+  line.add_flag("--spread", options.spread,
+                "each case runs on one of the targets, in turn");
+  line.add_flag("--owners", options.owners,
+                "print which threads ran which bins");
+}
+
 Options parseOptions(int argc, char **argv) {
+  CommandLine line(
+      "piko-compare [options] FILE",
+      "Runs pipelines on the reference executor and on one or more "
+      "targets, on the same made-up input, and compares all state "
+      "bit for bit.");
   Options options;
   Target one;
   std::optional<std::string> targets;
-  Words words({argv + 1, argv + argc});
-  while (!words.atEnd()) {
-    std::string name = words.take();
-    if (name.size() == 3 && name.rfind("-O", 0) == 0 && name[2] >= '0' &&
-        name[2] <= '3')
-      options.optLevel = name[2] - '0';
-    else if (name.rfind("--", 0) != 0)
-      options.file = name;
-    else if (name == "--check" || name.rfind("--check=", 0) == 0) {
-      auto check = piko::parseCheckOptions(name.substr(7));
-      if (!check)
-        throw std::runtime_error("expected --check[=nan:RECORD.FIELD,..]");
-      options.check = *check;
-    } else if (name == "--reference")
-      options.reference = words.takeValues(name, false)[0];
-    else if (name == "--cases")
-      options.cases = words.takeValues(name, false)[0];
-    else if (name == "--without") {
-      std::string text = words.takeValues(name, false)[0];
-      auto synthesis = piko::parseSynthesisOptions(text);
-      if (!synthesis)
-        throw std::runtime_error(piko::describeWrongSynthesisOptions(text));
-      options.synthesis.without = synthesis->without;
-    } else if (name == "--targets")
-      targets = words.takeValues(name, false)[0];
-    else if (name == "--mapping-window")
-      options.synthesis.mappingWindow =
-          toNumber<double>(words.takeValues(name, false)[0]);
-    else if (name == "--target") {
-      auto target = piko::parseGPUTarget(words.takeValues(name, false)[0]);
-      if (!target || *target == piko::GPUTarget::Auto)
-        throw std::runtime_error("expected --target cpu, cuda or gpu-on-cpu");
-      one.gpu.target = *target;
-    } else if (name == "--gpu-threads")
-      one.gpu.threads = toNumbers<int64_t>(words.takeValues(name, false))[0];
-    else if (name == "--gpu-chip") {
-      if (!one.gpu.setChips(words.takeValues(name, false)[0]))
-        throw std::runtime_error("expected --gpu-chip sm_90,..");
-    } else if (name == "--gpu-seed")
-      one.gpu.seed = toNumbers<int64_t>(words.takeValues(name, false))[0];
-    else if (name == "--gpu-blocks")
-      one.gpu.blocks = toNumbers<int64_t>(words.takeValues(name, false))[0];
-    else if (name == "--threads")
-      options.threads = toNumbers<int>(words.takeValues(name, true));
-    else if (name == "--runs")
-      options.runs = toNumbers<int>(words.takeValues(name, false))[0];
-    else if (name == "--timeout")
-      options.timeout = toNumbers<unsigned>(words.takeValues(name, false))[0];
-    else if (name == "--cpu")
-      one.cpu = words.takeValues(name, false)[0];
-    else if (name == "--tolerance")
-      options.tolerance = toNumber<double>(words.takeValues(name, false)[0]);
-    else if (name == "--stops")
-      options.stops = true;
-    else if (name == "--spread")
-      options.spread = true;
-    else if (name == "--owners")
-      options.owners = true;
-    else if (name == "--no-cache")
-      options.cache.enabled = false;
-    else if (!readCaseOption(name, words, options.one))
-      throw std::runtime_error("unknown option " + name);
-  }
+  addCompilerOptions(line, options);
+  addTargetOptions(line, one, targets);
+  addRunOptions(line, options);
+  line.beginGroup("Of a case");
+  addCaseOptions(line, options.one);
+  options.help = read(line, {argv + 1, argv + argc});
+  if (!options.help.empty())
+    return options;
   if (options.file.empty())
     throw std::runtime_error("expected a file");
   if (options.reference.empty())
@@ -210,17 +224,11 @@ std::vector<Case> readCases(const Options &options) {
     if (!line.starts_with(mark))
       continue;
     std::istringstream text(line.substr(mark.size()));
-    std::vector<std::string> list;
-    for (std::string word; text >> word;)
-      list.push_back(word);
-    Words words(list);
-    Case read = options.one;
-    while (!words.atEnd()) {
-      std::string name = words.take();
-      if (!readCaseOption(name, words, read))
-        throw std::runtime_error("unknown option " + name + " of a case");
-    }
-    cases.push_back(read);
+    Case one = options.one;
+    CommandLine words("", "");
+    addCaseOptions(words, one);
+    read(words, {std::istream_iterator<std::string>(text), {}});
+    cases.push_back(one);
   }
   if (cases.empty())
     throw std::runtime_error("expected a case in " + options.cases);

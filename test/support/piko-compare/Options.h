@@ -48,6 +48,7 @@ struct Target {
 };
 
 struct Options {
+  std::string help; ///< the text, if that is asked for
   std::string file;
   /// The C++ that the reference executor runs.
   std::string reference;

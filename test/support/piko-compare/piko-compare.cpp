@@ -3,17 +3,7 @@
 // piko-compare: runs pipelines on the reference executor and on one or more targets,
 // on the same made-up input, and compares all state bit for bit.
 //
-//   piko-compare FILE [--reference FILE] [--pipe NAME] [--domain W H ..]
-//                [--count N ..] [--seed S] [--wide] [--loop-limit N]
-//                [--strip N] [--budget BYTES] [--cases FILE]
-//                [--threads T ..] [--runs N] [--timeout SECONDS]
-//                [--check[=nan:RECORD.FIELD,..]] [--tolerance X]
-//                [--targets NAME,.. [--spread]] [--target cpu|gpu-on-cpu|cuda] [--cpu NAME]
-//                [--gpu-threads N] [--gpu-seed N] [--gpu-blocks N]
-//                [--gpu-chip NAME,..] [--without PASS,..] [-O0] [--no-cache]
-//                [--owners] [--stops]
-//
-// Options.h says what the options mean, Run.h what the input is. With --cases
+// --help says what the options are, Run.h what the input is. With --cases
 // each line of that file is a case, with the options --pipe to --budget; a
 // line of output says which case begins, and one how it ends. Exit status 0 if
 // all is equal.
@@ -242,7 +232,12 @@ bool compareAll(const Options &options) {
 /// Returns the exit status.
 static int run(int argc, char **argv) {
   try {
-    return compareAll(parseOptions(argc, argv)) ? 0 : 1;
+    Options options = parseOptions(argc, argv);
+    if (!options.help.empty()) {
+      std::fputs(options.help.c_str(), stdout);
+      return 0;
+    }
+    return compareAll(options) ? 0 : 1;
   } catch (const std::exception &error) {
     std::fprintf(stderr, "piko-compare: %s\n", error.what());
     return 2;
