@@ -52,54 +52,19 @@ double CostModel::covariance(size_t i, size_t j) const {
   return sum;
 }
 
-void CostModel::append(size_t row) {
-  std::vector<double> values(row + 1);
-  for (size_t j = 0; j <= row; ++j) {
-    double sum = covariance(row, j);
-    const std::vector<double> &other = j == row ? values : lower[j];
-    for (size_t k = 0; k < j; ++k)
-      sum -= values[k] * other[k];
-    values[j] = j == row ? std::sqrt(std::max(sum, 1e-12)) : sum / other[j];
-  }
-  lower.push_back(std::move(values));
-}
-
-std::vector<double> CostModel::solveLower(std::vector<double> values) const {
-  for (size_t i = 0; i < values.size(); ++i) {
-    for (size_t k = 0; k < i; ++k)
-      values[i] -= lower[i][k] * values[k];
-    values[i] /= lower[i][i];
-  }
-  return values;
-}
-
-std::vector<double> CostModel::solveUpper(std::vector<double> values) const {
-  for (size_t i = values.size(); i-- > 0;) {
-    values[i] /= lower[i][i];
-    for (size_t k = 0; k < i; ++k)
-      values[k] -= lower[i][k] * values[i];
-  }
-  return values;
-}
-
-void CostModel::solve() {
-  std::vector<double> values;
-  for (const Observation &observation : observations)
-    values.push_back(observation.logTime - mean);
-  weights = solveUpper(solveLower(std::move(values)));
-}
-
 double CostModel::factor() {
-  lower.clear();
-  double likelihood = 0;
-  for (size_t i = 0; i < observations.size(); ++i) {
-    append(i);
-    likelihood -= std::log(lower[i][i]);
+  auto count = Eigen::Index(observations.size());
+  Eigen::MatrixXd matrix(count, count);
+  Eigen::VectorXd values(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    values[i] = observations[i].logTime - mean;
+    for (Eigen::Index j = 0; j <= i; ++j)
+      matrix(i, j) = covariance(i, j);
   }
-  solve();
-  for (size_t i = 0; i < observations.size(); ++i)
-    likelihood -= weights[i] * (observations[i].logTime - mean) / 2;
-  return likelihood;
+  cholesky.compute(matrix);
+  weights = cholesky.solve(values);
+  return -cholesky.matrixLLT().diagonal().array().log().sum() -
+         weights.dot(values) / 2;
 }
 
 /// A variance is expected to be within a factor of ten or so of `usual`.
@@ -144,31 +109,18 @@ void CostModel::learn() {
   }
 }
 
-/// An element of the diagonal of the inverse.
-double CostModel::findPrecision(size_t row) const {
-  size_t count = observations.size();
-  std::vector<double> unit(count, 0.0);
-  unit[row] = 1;
-  double precision = 0;
-  for (size_t i = row; i < count; ++i) {
-    for (size_t k = row; k < i; ++k)
-      unit[i] -= lower[i][k] * unit[k];
-    unit[i] /= lower[i][i];
-    precision += unit[i] * unit[i];
-  }
-  return precision;
-}
-
 /// What the others let expect of an observation, for all of them, follows from
 /// the diagonal of the inverse (leave-one-out).
 void CostModel::doubtOutliers() {
   size_t count = observations.size();
   for (size_t found = 0; found <= count / 8; ++found) {
     factor();
+    Eigen::VectorXd precision =
+        cholesky.solve(Eigen::MatrixXd::Identity(count, count)).diagonal();
     size_t worst = 0;
     double most = 0;
     for (size_t i = 0; i < count; ++i) {
-      double z = weights[i] / std::sqrt(findPrecision(i));
+      double z = weights[i] / std::sqrt(precision[i]);
       if (doubts[i] == 0 && z > most) {
         most = z;
         worst = i;
@@ -202,20 +154,15 @@ void CostModel::believe(const Setting &setting) {
   observations.push_back(
       {setting, firstOwnRound + observations.size(), logTime});
   doubts.push_back(0);
-  append(observations.size() - 1);
-  solve();
+  factor();
 }
 
 CostModel::Prediction CostModel::predict(const Setting &setting) const {
-  std::vector<double> alike;
-  Prediction result{.mean = mean};
-  for (size_t i = 0; i < observations.size(); ++i) {
-    alike.push_back(priorOfMean + compare(observations[i].setting, setting));
-    result.mean += weights[i] * alike[i];
-  }
-  double variance = priorOfMean + parameters.scale;
-  for (double value : solveLower(std::move(alike)))
-    variance -= value * value;
-  result.deviation = std::sqrt(std::max(variance, 0.0));
-  return result;
+  Eigen::VectorXd alike(observations.size());
+  for (size_t i = 0; i < observations.size(); ++i)
+    alike[i] = priorOfMean + compare(observations[i].setting, setting);
+  double variance = priorOfMean + parameters.scale -
+                    cholesky.matrixL().solve(alike).squaredNorm();
+  return {.mean = mean + weights.dot(alike),
+          .deviation = std::sqrt(std::max(variance, 0.0))};
 }

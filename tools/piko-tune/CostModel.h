@@ -11,6 +11,8 @@
 #ifndef PIKO_TOOLS_PIKOTUNE_COSTMODEL_H
 #define PIKO_TOOLS_PIKOTUNE_COSTMODEL_H
 
+#include <Eigen/Cholesky>
+
 #include <cstddef>
 #include <vector>
 
@@ -52,21 +54,17 @@ private:
 
   double compare(const Setting &a, const Setting &b) const;
   double covariance(size_t i, size_t j) const;
-  /// Factors the covariance; returns the logarithm of the likelihood.
+  /// Factors the covariance, which gives the weights; returns the logarithm of
+  /// the likelihood.
   double factor();
-  void append(size_t row);
-  void solve();
   void learn();
-  double findPrecision(size_t row) const;
   void doubtOutliers();
-  std::vector<double> solveLower(std::vector<double> values) const;
-  std::vector<double> solveUpper(std::vector<double> values) const;
 
   Parameters parameters;
   std::vector<Observation> observations;
-  std::vector<double> doubts;             ///< variances added to the noise
-  std::vector<std::vector<double>> lower; ///< Cholesky's factor, by rows
-  std::vector<double> weights;            ///< of the observations
+  std::vector<double> doubts;           ///< variances added to the noise
+  Eigen::LLT<Eigen::MatrixXd> cholesky; ///< of the covariance
+  Eigen::VectorXd weights;              ///< of the observations
   double mean = 0;
   size_t learned = 0; ///< observations when parameters were learned
 };
