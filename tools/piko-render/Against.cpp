@@ -104,19 +104,18 @@ std::string render::printAgreements(const std::vector<Agreement> &agreements) {
   return text;
 }
 
-std::vector<JsonObject>
-render::reportAgreements(const std::vector<Agreement> &agreements) {
-  std::vector<JsonObject> report;
+Json render::reportAgreements(const std::vector<Agreement> &agreements) {
+  Json report = Json::array();
   for (const Agreement &agreement : agreements) {
-    JsonObject &object = report.emplace_back();
-    object.add("target", agreement.target)
-        .add("equal", agreement.isEqual ? 1 : 0)
-        .add("within", agreement.isWithin ? 1 : 0)
-        .addExact("relative", agreement.relative);
+    Json &object = report.emplace_back();
+    object["target"] = agreement.target;
+    object["equal"] = agreement.isEqual ? 1 : 0;
+    object["within"] = agreement.isWithin ? 1 : 0;
+    object["relative"] = agreement.relative;
     std::string text = agreement.error;
     for (const std::string &difference : agreement.differences)
       text += (text.empty() ? "" : "; ") + difference;
-    object.add("differences", text);
+    object["differences"] = text;
   }
   return report;
 }

@@ -31,8 +31,7 @@ Result<std::vector<Agreement>> runAgainst(const Options &options);
 bool agree(const std::vector<Agreement> &agreements);
 
 std::string printAgreements(const std::vector<Agreement> &agreements);
-std::vector<JsonObject>
-reportAgreements(const std::vector<Agreement> &agreements);
+Json reportAgreements(const std::vector<Agreement> &agreements);
 
 } // namespace piko::render
 

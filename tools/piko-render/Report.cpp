@@ -28,82 +28,83 @@ std::string nameDevice(pikort_pipeline *pipeline) {
 }
 
 /// Which versions of its loops a kernel runs, and why.
-std::vector<JsonObject> reportMappings(pikort_pipeline *pipeline,
-                                       const std::string &kernel) {
-  std::vector<JsonObject> mappings;
+Json reportMappings(pikort_pipeline *pipeline, const std::string &kernel) {
+  Json mappings = Json::array();
   for (const pikort_mapping_info &info : readMappings(pipeline))
     if (kernel == info.kernel)
-      mappings.push_back(JsonObject()
-                             .add("number", info.number)
-                             .add("within", info.within)
-                             .add("loop", info.loop)
-                             .add("runs", nameVersion(info.vectors))
-                             .add("expected", nameVersion(info.expected))
-                             .add("because", explainMapping(info))
-                             .add("expected_ratio", info.expected_ratio)
-                             .add("measured_ratio", info.measured_ratio));
+      mappings.push_back(Json::object(
+          {{"number", info.number},
+           {"within", info.within},
+           {"loop", info.loop},
+           {"runs", nameVersion(info.vectors)},
+           {"expected", nameVersion(info.expected)},
+           {"because", explainMapping(info)},
+           {"expected_ratio", roundToThousandths(info.expected_ratio)},
+           {"measured_ratio", roundToThousandths(info.measured_ratio)}}));
   return mappings;
 }
 
 /// Where a device has all of a run it is not known what its kernels took,
 /// unless somebody has asked for it.
-std::vector<JsonObject> reportKernels(pikort_pipeline *pipeline, double runs) {
-  std::vector<JsonObject> kernels;
+Json reportKernels(pikort_pipeline *pipeline, double runs) {
+  Json kernels = Json::array();
   for (int32_t i = 0; i < pikort_kernel_count(pipeline); ++i) {
     pikort_kernel_stats stats;
     if (pikort_get_kernel_stats(pipeline, i, &stats) != PIKORT_OK)
       continue;
-    JsonObject &kernel = kernels.emplace_back();
-    kernel.add("name", stats.name);
+    Json &kernel = kernels.emplace_back();
+    kernel["name"] = stats.name;
     bool isKnown = stats.launches > 0 || !isOnDevice(pipeline);
-    if (isKnown)
-      kernel.add("ms", stats.milliseconds / runs)
-          .add("join_ms", stats.join_milliseconds / runs)
-          .add("wait_ms", stats.wait_milliseconds / runs)
-          .add("launches", double(stats.launches) / runs)
-          .add("parallel_launches", double(stats.parallel_launches) / runs);
+    if (isKnown) {
+      kernel["ms"] = roundToThousandths(stats.milliseconds / runs);
+      kernel["join_ms"] = roundToThousandths(stats.join_milliseconds / runs);
+      kernel["wait_ms"] = roundToThousandths(stats.wait_milliseconds / runs);
+      kernel["launches"] = roundToThousandths(double(stats.launches) / runs);
+      kernel["parallel_launches"] =
+          roundToThousandths(double(stats.parallel_launches) / runs);
+    }
     if (auto mappings = reportMappings(pipeline, stats.name); !mappings.empty())
-      kernel.add("mappings", mappings);
+      kernel["mappings"] = mappings;
   }
   return kernels;
 }
 
-std::vector<JsonObject> reportStages(pikort_pipeline *pipeline, double runs) {
-  std::vector<JsonObject> stages;
+Json reportStages(pikort_pipeline *pipeline, double runs) {
+  Json stages = Json::array();
   for (int32_t i = 0; i < pikort_stage_count(pipeline); ++i) {
     pikort_stage_stats stats;
     if (pikort_get_stage_stats(pipeline, i, &stats) != PIKORT_OK)
       continue;
-    stages.push_back(JsonObject()
-                         .add("name", stats.name)
-                         .add("in", double(stats.in) / runs)
-                         .add("placed", double(stats.placed) / runs)
-                         .add("out", double(stats.out) / runs));
+    stages.push_back(Json::object(
+        {{"name", stats.name},
+         {"in", roundToThousandths(double(stats.in) / runs)},
+         {"placed", roundToThousandths(double(stats.placed) / runs)},
+         {"out", roundToThousandths(double(stats.out) / runs)}}));
   }
   return stages;
 }
 
 /// The parts of a mean frame, which sum to ms_mean.
-JsonObject reportTime(pikort_pipeline *pipeline, double runs) {
+Json reportTime(pikort_pipeline *pipeline, double runs) {
   pikort_time_stats stats{};
   pikort_get_time_stats(pipeline, &stats);
-  JsonObject report;
-  report.add("kernels_ms", stats.kernels / runs)
-      .add("waiting_ms", stats.waiting / runs)
-      .add("joins_ms", stats.joins / runs)
-      .add("cycles_ms", stats.cycles / runs)
-      .add("clears_ms", stats.clears / runs)
-      .add("allocation_ms", stats.allocation / runs)
-      .add("program_ms", stats.program / runs);
+  Json report = Json::object();
+  report["kernels_ms"] = roundToThousandths(stats.kernels / runs);
+  report["waiting_ms"] = roundToThousandths(stats.waiting / runs);
+  report["joins_ms"] = roundToThousandths(stats.joins / runs);
+  report["cycles_ms"] = roundToThousandths(stats.cycles / runs);
+  report["clears_ms"] = roundToThousandths(stats.clears / runs);
+  report["allocation_ms"] = roundToThousandths(stats.allocation / runs);
+  report["program_ms"] = roundToThousandths(stats.program / runs);
   if (isOnDevice(pipeline))
-    report.add("device_ms", stats.device / runs);
+    report["device_ms"] = roundToThousandths(stats.device / runs);
   return report;
 }
 
-JsonObject reportCounts(const std::vector<Count> &counts) {
-  JsonObject report;
+Json reportCounts(const std::vector<Count> &counts) {
+  Json report = Json::object();
   for (const Count &count : counts)
-    report.add(count.name, count.sum);
+    report[count.name] = count.sum;
   return report;
 }
 
@@ -134,8 +135,8 @@ bool render::isTimed(const Options &options, pikort_pipeline *pipeline) {
   return options.kernelTimes && isOnDevice(pipeline);
 }
 
-Result<std::vector<JsonObject>> render::timeKernels(const Options &options,
-                                                    pikort_pipeline *pipeline) {
+Result<Json> render::timeKernels(const Options &options,
+                                 pikort_pipeline *pipeline) {
   constexpr int most = 3;
   int frames = std::min(most, options.frames);
   pikort_reset_stats(pipeline);
@@ -147,45 +148,45 @@ Result<std::vector<JsonObject>> render::timeKernels(const Options &options,
   return reportKernels(pipeline, frames);
 }
 
-JsonObject render::makeReport(const Options &options, const RunResult &result,
-                              pikort_pipeline *pipeline) {
+Json render::makeReport(const Options &options, const RunResult &result,
+                        pikort_pipeline *pipeline) {
   double runs = runsOf(pipeline);
   bool isReference = options.load.target == ExecutionTarget::Reference;
   const char *target = nameTarget(options, pipeline);
   std::string name = pikort_name(pipeline);
-  JsonObject report;
-  report.add("peer", "piko")
-      .add("scene", std::filesystem::path(options.scene).filename().string())
-      .add("tris", result.triangles)
-      .add("verts", result.vertices)
-      .add("w", result.width)
-      .add("h", result.height)
-      .add("lights", options.lights)
-      .add("ms_median", result.times.median)
-      .add("ms_min", result.times.min)
-      .add("ms_max", result.times.max)
-      .add("ms_mean", result.times.mean)
-      .add("threads", result.threads)
-      .add("mode", name + (isReference ? "+reference" : ""))
-      .add("pixels", result.pixels)
-      .add("image_hash", result.imageHash)
-      .add("renderer", std::string("Piko, ") + target)
-      .add("pipe", name)
-      .add("target", target)
-      .add("frames", result.times.count)
-      .add("compile_ms", result.compileMilliseconds)
-      .add("load_ms", result.loadMilliseconds)
-      .add("patches", result.patches)
-      .add("counters", reportCounts(result.counts));
+  Json report = Json::object();
+  report["peer"] = "piko";
+  report["scene"] = std::filesystem::path(options.scene).filename().string();
+  report["tris"] = result.triangles;
+  report["verts"] = result.vertices;
+  report["w"] = result.width;
+  report["h"] = result.height;
+  report["lights"] = options.lights;
+  report["ms_median"] = roundToThousandths(result.times.median);
+  report["ms_min"] = roundToThousandths(result.times.min);
+  report["ms_max"] = roundToThousandths(result.times.max);
+  report["ms_mean"] = roundToThousandths(result.times.mean);
+  report["threads"] = result.threads;
+  report["mode"] = name + (isReference ? "+reference" : "");
+  report["pixels"] = result.pixels;
+  report["image_hash"] = result.imageHash;
+  report["renderer"] = std::string("Piko, ") + target;
+  report["pipe"] = name;
+  report["target"] = target;
+  report["frames"] = result.times.count;
+  report["compile_ms"] = roundToThousandths(result.compileMilliseconds);
+  report["load_ms"] = roundToThousandths(result.loadMilliseconds);
+  report["patches"] = result.patches;
+  report["counters"] = reportCounts(result.counts);
   if (isOnDevice(pipeline))
-    report.add("device", nameDevice(pipeline));
+    report["device"] = nameDevice(pipeline);
   if (isReference) // the runtime does not see inside of it
     return report;
-  report.add("peak_bin_bytes", pikort_peak_bytes(pipeline))
-      .add("time", reportTime(pipeline, runs));
+  report["peak_bin_bytes"] = pikort_peak_bytes(pipeline);
+  report["time"] = reportTime(pipeline, runs);
   if (!isTimed(options, pipeline))
-    report.add("kernels", reportKernels(pipeline, runs));
-  report.add("stages", reportStages(pipeline, runs));
+    report["kernels"] = reportKernels(pipeline, runs);
+  report["stages"] = reportStages(pipeline, runs);
   return report;
 }
 

@@ -35,14 +35,13 @@ bool isTimed(const Options &options, pikort_pipeline *pipeline);
 
 /// What kernels take on a device, for each frame, of frames of their own. They
 /// change state and statistics of the pipeline.
-Result<std::vector<JsonObject>> timeKernels(const Options &options,
-                                            pikort_pipeline *pipeline);
+Result<Json> timeKernels(const Options &options, pikort_pipeline *pipeline);
 
 /// The JSON line, without kernels that are timed by themselves: first what all
 /// renderers of the comparison report, then what the runtime counted, for each
 /// frame.
-JsonObject makeReport(const Options &options, const RunResult &result,
-                      pikort_pipeline *pipeline);
+Json makeReport(const Options &options, const RunResult &result,
+                pikort_pipeline *pipeline);
 
 /// The same in short, for people.
 std::string summarize(const RunResult &result, pikort_pipeline *pipeline);

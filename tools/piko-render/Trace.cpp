@@ -19,19 +19,19 @@ struct Units {
   std::vector<pikort_unit_run> list;
 };
 
-JsonObject makeEvent(const pikort_unit_run &unit) {
-  JsonObject bins;
-  bins.add("bins begin", unit.bin_begin)
-      .add("bins end", unit.bin_end)
-      .add("primitives", unit.primitives);
-  return JsonObject()
-      .add("name", unit.stage)
-      .add("ph", "X") // complete: with a duration, in microseconds
-      .add("pid", 0)
-      .add("tid", unit.thread)
-      .add("ts", unit.begin * 1000)
-      .add("dur", (unit.end - unit.begin) * 1000)
-      .add("args", bins);
+Json makeEvent(const pikort_unit_run &unit) {
+  Json bins = Json::object();
+  bins["bins begin"] = unit.bin_begin;
+  bins["bins end"] = unit.bin_end;
+  bins["primitives"] = unit.primitives;
+  return Json::object(
+      {{"name", unit.stage},
+       {"ph", "X"}, // complete: with a duration, in microseconds
+       {"pid", 0},
+       {"tid", unit.thread},
+       {"ts", roundToThousandths(unit.begin * 1000)},
+       {"dur", roundToThousandths((unit.end - unit.begin) * 1000)},
+       {"args", bins}});
 }
 
 } // namespace
@@ -50,24 +50,24 @@ Result<Done> piko::render::traceFrame(pikort_pipeline *pipeline,
   if (status != PIKORT_OK)
     return Error{pikort_message(pipeline)};
 
-  std::vector<JsonObject> events;
+  Json events = Json::array();
   // Marks at the frame's begin: which versions of loops the units run.
   for (const pikort_mapping_info &info : readMappings(pipeline))
-    events.push_back(
-        JsonObject()
-            .add("name", std::string(info.kernel) + ": " + info.loop)
-            .add("ph", "i")
-            .add("s", "g") // of the whole trace
-            .add("pid", 0)
-            .add("tid", 0)
-            .add("ts", 0)
-            .add("args", JsonObject()
-                             .add("runs", nameVersion(info.vectors))
-                             .add("because", explainMapping(info))
-                             .add("expected ratio", info.expected_ratio)
-                             .add("measured ratio", info.measured_ratio)));
+    events.push_back(Json::object(
+        {{"name", std::string(info.kernel) + ": " + info.loop},
+         {"ph", "i"},
+         {"s", "g"}, // of the whole trace
+         {"pid", 0},
+         {"tid", 0},
+         {"ts", 0},
+         {"args", Json::object({{"runs", nameVersion(info.vectors)},
+                                {"because", explainMapping(info)},
+                                {"expected ratio",
+                                 roundToThousandths(info.expected_ratio)},
+                                {"measured ratio",
+                                 roundToThousandths(info.measured_ratio)}})}}));
   for (const pikort_unit_run &unit : units.list)
     events.push_back(makeEvent(unit));
   return support::writeFile(
-      path, JsonObject().add("traceEvents", events).text() + "\n");
+      path, writeLine(Json::object({{"traceEvents", events}})) + "\n");
 }

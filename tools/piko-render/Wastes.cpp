@@ -191,12 +191,12 @@ std::string render::printWastes(const std::vector<Waste> &wastes) {
   return all;
 }
 
-std::vector<JsonObject> render::reportWastes(const std::vector<Waste> &wastes) {
-  std::vector<JsonObject> reports;
+Json render::reportWastes(const std::vector<Waste> &wastes) {
+  Json reports = Json::array();
   for (const Waste &waste : wastes)
-    reports.push_back(JsonObject()
-                          .add("ms", waste.milliseconds)
-                          .add("what", waste.what)
-                          .add("advice", waste.advice));
+    reports.push_back(
+        Json::object({{"ms", roundToThousandths(waste.milliseconds)},
+                      {"what", waste.what},
+                      {"advice", waste.advice}}));
   return reports;
 }

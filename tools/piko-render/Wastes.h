@@ -23,7 +23,7 @@ std::vector<Waste> findWastes(const Work &work, pikort_pipeline *timed,
 std::string printWastes(const std::vector<Waste> &wastes);
 
 /// All of them, for programs.
-std::vector<JsonObject> reportWastes(const std::vector<Waste> &wastes);
+Json reportWastes(const std::vector<Waste> &wastes);
 
 } // namespace piko::render
 

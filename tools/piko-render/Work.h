@@ -73,7 +73,7 @@ Result<Work> measureWork(const Options &options, SceneInput &scene,
                          pikort_pipeline *timed);
 
 /// The same for programs: what is needed is beside what is done.
-JsonObject reportWork(const Work &work);
+Json reportWork(const Work &work);
 
 /// The same for people: tables.
 std::string printWork(const Work &work, int64_t pixels);

@@ -31,77 +31,73 @@ static const char *describeAccess(int32_t kind) {
 // JSON
 //===----------------------------------------------------------------------===//
 
-static JsonObject reportStage(const StageWork &stage) {
-  return JsonObject()
-      .add("name", stage.name)
-      .add("primitives", stage.primitives)
-      .add("calls", stage.calls)
-      .add("least", stage.least)
-      .add("ratio", ratio(stage.calls, stage.least))
-      .add("updates", stage.updates)
-      .add("emissions", stage.emissions)
-      .add("floats", stage.floats)
-      .add("integers", stage.integers);
+static Json reportStage(const StageWork &stage) {
+  return Json::object(
+      {{"name", stage.name},
+       {"primitives", stage.primitives},
+       {"calls", stage.calls},
+       {"least", stage.least},
+       {"ratio", roundToThousandths(ratio(stage.calls, stage.least))},
+       {"updates", stage.updates},
+       {"emissions", stage.emissions},
+       {"floats", stage.floats},
+       {"integers", stage.integers}});
 }
 
-static JsonObject reportEdge(const EdgeWork &edge) {
-  return JsonObject()
-      .add("from", edge.from)
-      .add("port", edge.port)
-      .add("to", edge.to)
-      .add("primitives", edge.primitives)
-      .add("bytes", edge.bytes)
-      .add("stored", edge.stored);
+static Json reportEdge(const EdgeWork &edge) {
+  return Json::object({{"from", edge.from},
+                       {"port", edge.port},
+                       {"to", edge.to},
+                       {"primitives", edge.primitives},
+                       {"bytes", edge.bytes},
+                       {"stored", edge.stored}});
 }
 
-static JsonObject reportAccess(const AccessWork &access) {
-  return JsonObject()
-      .add("stage", access.stage)
-      .add("state", access.state)
-      .add("kind", describeAccess(access.kind))
-      .add("count", access.count)
-      .add("bytes", access.bytes)
-      .add("elements", access.distinct)
-      .add("least", access.distinctBytes)
-      .add("ratio", ratio(access.bytes, access.distinctBytes));
+static Json reportAccess(const AccessWork &access) {
+  return Json::object({{"stage", access.stage},
+                       {"state", access.state},
+                       {"kind", describeAccess(access.kind)},
+                       {"count", access.count},
+                       {"bytes", access.bytes},
+                       {"elements", access.distinct},
+                       {"least", access.distinctBytes},
+                       {"ratio", roundToThousandths(ratio(
+                                     access.bytes, access.distinctBytes))}});
 }
 
-static JsonObject reportLoop(const LoopWork &loop) {
-  return JsonObject()
-      .add("stage", loop.stage)
-      .add("place", loop.place)
-      .add("parallel", int(loop.isParallel))
-      .add("iterations", loop.iterations)
-      .add("around", loop.around)
-      .add("effects", loop.effects);
+static Json reportLoop(const LoopWork &loop) {
+  return Json::object({{"stage", loop.stage},
+                       {"place", loop.place},
+                       {"parallel", int(loop.isParallel)},
+                       {"iterations", loop.iterations},
+                       {"around", loop.around},
+                       {"effects", loop.effects}});
 }
 
-static JsonObject reportKernel(const KernelWork &kernel) {
-  return JsonObject()
-      .add("name", kernel.name)
-      .add("scalars", kernel.scalars)
-      .add("vectors", kernel.vectors)
-      .add("lanes", kernel.lanes)
-      .add("active_lanes", kernel.active)
-      .add("ratio", ratio(kernel.lanes, kernel.active));
+static Json reportKernel(const KernelWork &kernel) {
+  return Json::object(
+      {{"name", kernel.name},
+       {"scalars", kernel.scalars},
+       {"vectors", kernel.vectors},
+       {"lanes", kernel.lanes},
+       {"active_lanes", kernel.active},
+       {"ratio", roundToThousandths(ratio(kernel.lanes, kernel.active))}});
 }
 
 template <class T>
-static std::vector<JsonObject> reportAll(const std::vector<T> &all,
-                                         JsonObject (*report)(const T &)) {
-  std::vector<JsonObject> reports;
+static Json reportAll(const std::vector<T> &all, Json (*report)(const T &)) {
+  Json reports = Json::array();
   for (const T &one : all)
     reports.push_back(report(one));
   return reports;
 }
 
-JsonObject render::reportWork(const Work &work) {
-  return JsonObject()
-      .add("stages", reportAll(work.stages, reportStage))
-      .add("edges", reportAll(work.edges, reportEdge))
-      .add("accesses", reportAll(work.accesses, reportAccess))
-      .add("loops", reportAll(work.loops, reportLoop))
-      .add("kernels", reportAll(work.kernels, reportKernel));
+Json render::reportWork(const Work &work) {
+  return Json::object({{"stages", reportAll(work.stages, reportStage)},
+                       {"edges", reportAll(work.edges, reportEdge)},
+                       {"accesses", reportAll(work.accesses, reportAccess)},
+                       {"loops", reportAll(work.loops, reportLoop)},
+                       {"kernels", reportAll(work.kernels, reportKernel)}});
 }
 
 //===----------------------------------------------------------------------===//

@@ -164,16 +164,16 @@ Result<Done> specializeFrame(Options &options, SceneInput &scene,
 Result<Done> report(const Options &options, const RunResult &result,
                     SceneInput &scene, const std::vector<Agreement> &agreements,
                     pikort_pipeline *pipeline) {
-  JsonObject line = makeReport(options, result, pipeline);
+  Json line = makeReport(options, result, pipeline);
   std::string text =
       summarize(result, pipeline) + "\n" + printAgreements(agreements);
   if (!agreements.empty())
-    line.add("against", reportAgreements(agreements));
+    line["against"] = reportAgreements(agreements);
   if (options.json && isTimed(options, pipeline)) {
     auto kernels = timeKernels(options, pipeline);
     if (!kernels)
       return kernels.error();
-    line.add("kernels", *kernels);
+    line["kernels"] = *kernels;
   }
   if (options.counters || options.explain) {
     auto work = measureWork(options, scene, pipeline);
@@ -181,13 +181,15 @@ Result<Done> report(const Options &options, const RunResult &result,
       return work.error();
     std::vector<Waste> wastes =
         findWastes(*work, pipeline, options.load.gpu.target == GPUTarget::None);
-    line.add("work", reportWork(*work)).add("wastes", reportWastes(wastes));
+    line["work"] = reportWork(*work);
+    line["wastes"] = reportWastes(wastes);
     if (options.counters)
       text += printWork(*work, result.pixels);
     if (options.explain)
       text += printWastes(wastes) + printMappings(pipeline);
   }
-  std::printf("%s", options.json ? (line.text() + "\n").c_str() : text.c_str());
+  std::printf("%s",
+              options.json ? (writeLine(line) + "\n").c_str() : text.c_str());
   return support::finishOutput();
 }
 

@@ -7,7 +7,7 @@
 
 using namespace piko;
 using namespace piko::tune;
-using render::JsonObject;
+using render::Json;
 
 static std::string print(const char *format, double number) {
   char text[64];
@@ -78,60 +78,61 @@ std::string tune::summarize(const TuneResult &result) {
   return lines;
 }
 
-static JsonObject describeJson(const Duel &duel) {
-  return JsonObject()
-      .add("wins", duel.wins)
-      .add("rounds", duel.rounds)
-      .addExact("p", duel.chance())
-      .add("ratio", duel.ratio);
+static Json describeJson(const Duel &duel) {
+  return Json::object({{"wins", duel.wins},
+                       {"rounds", duel.rounds},
+                       {"p", duel.chance()},
+                       {"ratio", render::roundToThousandths(duel.ratio)}});
 }
 
 /// Where and how was measured, and what.
-static JsonObject describeMeasurement(const TuneResult &result) {
+static Json describeMeasurement(const TuneResult &result) {
   const render::Options &render = result.options.render;
   const Outcome &outcome = result.outcome;
-  JsonObject object;
-  object.add("scene", std::filesystem::path(render.scene).filename().string())
-      .add("width", render.view.width)
-      .add("height", render.view.height)
-      .add("lights", render.lights)
-      .add("threads", render.threads)
-      .add("processor", getProcessorName())
-      .add("clock", result.options.countsCPU ? "cpu" : "wall")
-      .add("metric", result.options.metricName)
-      .addExact("error_limit", result.options.error)
-      .addExact("error", *outcome.chosen->error)
-      .add("ms", outcome.chosen->median())
-      .add("text_ms", outcome.text->median())
-      .add("text", result.space.name(outcome.text->setting))
-      .add("against_text", describeJson(outcome.againstText));
+  Json object = Json::object();
+  object["scene"] = std::filesystem::path(render.scene).filename().string();
+  object["width"] = render.view.width;
+  object["height"] = render.view.height;
+  object["lights"] = render.lights;
+  object["threads"] = render.threads;
+  object["processor"] = getProcessorName();
+  object["clock"] = result.options.countsCPU ? "cpu" : "wall";
+  object["metric"] = result.options.metricName;
+  object["error_limit"] = result.options.error;
+  object["error"] = *outcome.chosen->error;
+  object["ms"] = render::roundToThousandths(outcome.chosen->median());
+  object["text_ms"] = render::roundToThousandths(outcome.text->median());
+  object["text"] = result.space.name(outcome.text->setting);
+  object["against_text"] = describeJson(outcome.againstText);
   return object;
 }
 
 std::string tune::writeJson(const TuneResult &result) {
   const Outcome &outcome = result.outcome;
-  JsonObject object;
-  object.add("chosen", result.space.name(outcome.chosen->setting))
-      .add("changes", countChanges(outcome.chosen->setting))
-      .add("measured", describeMeasurement(result));
-  if (outcome.runnerUp)
-    object.add("runner_up", result.space.name(outcome.runnerUp->setting))
-        .add("against_runner_up", describeJson(outcome.againstRunnerUp));
-  object.add("runs", outcome.runs)
-      .add("settings", result.trials.size())
-      .add("compilations", outcome.compilations)
-      .add("left_out", countLeftOut(result))
-      .add("budget_spent", int(outcome.isBudgetSpent))
-      .add("missed_changes", outcome.missedChanges);
-  if (const auto &survey = result.survey)
-    object.add("all_settings", survey->settings)
-        .add("all_programs", survey->programs)
-        .add("all_runs", survey->runs)
-        .add("best", result.space.name(survey->best))
-        .addExact("regret", survey->regret)
-        .addExact("regret_least", survey->leastRegret)
-        .addExact("regret_most", survey->mostRegret);
-  return object.text() + "\n";
+  Json object = Json::object();
+  object["chosen"] = result.space.name(outcome.chosen->setting);
+  object["changes"] = countChanges(outcome.chosen->setting);
+  object["measured"] = describeMeasurement(result);
+  if (outcome.runnerUp) {
+    object["runner_up"] = result.space.name(outcome.runnerUp->setting);
+    object["against_runner_up"] = describeJson(outcome.againstRunnerUp);
+  }
+  object["runs"] = outcome.runs;
+  object["settings"] = result.trials.size();
+  object["compilations"] = outcome.compilations;
+  object["left_out"] = countLeftOut(result);
+  object["budget_spent"] = int(outcome.isBudgetSpent);
+  object["missed_changes"] = outcome.missedChanges;
+  if (const auto &survey = result.survey) {
+    object["all_settings"] = survey->settings;
+    object["all_programs"] = survey->programs;
+    object["all_runs"] = survey->runs;
+    object["best"] = result.space.name(survey->best);
+    object["regret"] = survey->regret;
+    object["regret_least"] = survey->leastRegret;
+    object["regret_most"] = survey->mostRegret;
+  }
+  return render::writeLine(object) + "\n";
 }
 
 /// A field of CSV.
@@ -168,5 +169,6 @@ std::string tune::writeSetting(const TuneResult &result) {
   const auto &without = result.options.render.load.synthesis.without;
   setting.without.insert(setting.without.end(), without.begin(), without.end());
   setting.mappings = result.mappings;
-  return writeTunedSetting(setting, describeMeasurement(result).text());
+  return writeTunedSetting(setting,
+                           render::writeLine(describeMeasurement(result)));
 }
