@@ -1,5 +1,11 @@
 //===- Chart.h - Error against time, as SVG ---------------------*- C++ -*-===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Written without a library: piko-tune is installed where there may be neither
+// Python nor matplotlib, and each point of the SVG says its setting to who
+// points at it, which matplotlib's do not.
+//
+//===----------------------------------------------------------------------===//
 #ifndef PIKO_TOOLS_PIKOTUNE_CHART_H
 #define PIKO_TOOLS_PIKOTUNE_CHART_H
 
