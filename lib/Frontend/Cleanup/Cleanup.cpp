@@ -183,9 +183,8 @@ static void dropUnreachableDefaults(llvm::Function &function) {
 }
 
 /// What runs when the pipeline does; the other wrappers are computed now.
-static bool isPhase(const llvm::Function &function) {
-  llvm::StringRef name = function.getName();
-  return !name.contains("_wire_") && !name.contains("_clear_");
+static bool isPhase(WrapperKind wrapper) {
+  return wrapper != WrapperKind::Wire && wrapper != WrapperKind::Clear;
 }
 
 /// Refuses loops that nothing leaves; false after an error.
@@ -213,18 +212,19 @@ static bool checkLoops(llvm::Function &function, const ParsedUnit &unit,
 static void prepareFunction(llvm::Function &function, ParsedUnit &unit,
                             MemoryMap &memory, PassRunner &runner,
                             mlir::MLIRContext &context) {
+  WrapperKind wrapper = unit.wrappers.getKind(function);
   redirectMathCalls(function, unit, context);
   inlineKnownCalls(function);
   llvm::FunctionPassManager weigh;
   weigh.addPass(llvm::LowerExpectIntrinsicPass());
   runner.run(weigh, function);
   if (unit.module->getModuleFlag(checkingFlag) &&
-      function.getName().contains("_process_"))
+      wrapper == WrapperKind::Process)
     fillVariables(function, memory);
   labelLoops(function, memory);
   dropHints(function);
-  expandMarkers(function, memory);
-  if (isPhase(function))
+  expandMarkers(function, memory, /*isWiring=*/wrapper == WrapperKind::Wire);
+  if (isPhase(wrapper))
     holdDivisions(function);
 }
 
@@ -259,7 +259,8 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     return false;
   holdMembers(function);
   runner.run(simplify, function);
-  if (function.getName().starts_with("__piko_wrapper_clear_")) {
+  bool isClear = unit.wrappers.getKind(function) == WrapperKind::Clear;
+  if (isClear) {
     releaseMembers(function);
     unrollLoops(function, runner);
   }
@@ -300,7 +301,7 @@ static bool cleanUpFunction(llvm::Function &function, ParsedUnit &unit,
     return false;
   shareArrays(function, memory);
   llvm::FunctionPassManager promote;
-  if (function.getName().contains("_clear_")) {
+  if (isClear) {
     promote.addPass(llvm::InstCombinePass());
     runner.run(promote, function);
     promote = llvm::FunctionPassManager();
@@ -390,11 +391,11 @@ static void dropWiring(llvm::Function &constructor, const MarkerTable &markers,
 /// Wrappers become one function each. Each of a phase builds the pipeline: the
 /// edges, as many as stages, are for the one that is read for them.
 static void inlineCalls(llvm::ArrayRef<llvm::Function *> wrappers,
-                        llvm::Module &module, const MemoryMap &memory,
-                        const MarkerTable &markers, PassRunner &runner) {
-  std::string wireName = getWrapperName(WrapperKind::Wire, 0);
+                        const ParsedUnit &unit, const MemoryMap &memory,
+                        PassRunner &runner) {
+  llvm::Module &module = *unit.module;
   llvm::CallInst *wiring =
-      findConstructorCall(*module.getFunction(wireName), memory);
+      findConstructorCall(unit.wrappers.get(module, WrapperKind::Wire), memory);
   llvm::Function *constructor = wiring ? wiring->getCalledFunction() : nullptr;
   if (constructor)
     constructor->removeFnAttr(llvm::Attribute::AlwaysInline);
@@ -406,7 +407,7 @@ static void inlineCalls(llvm::ArrayRef<llvm::Function *> wrappers,
     return;
   llvm::InlineFunctionInfo info;
   llvm::InlineFunction(*wiring, info);
-  dropWiring(*constructor, markers, runner);
+  dropWiring(*constructor, unit.markers, runner);
   for (llvm::Function *wrapper : wrappers)
     if (llvm::CallInst *call = findConstructorCall(*wrapper, memory))
       llvm::InlineFunction(*call, info);
@@ -421,7 +422,7 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
   setMarkerEffects(module, unit.markers);
   std::vector<llvm::Function *> wrappers, mathFunctions;
   for (llvm::Function &function : module) {
-    if (function.getName().starts_with("__piko_wrapper_"))
+    if (unit.wrappers.contains(function))
       wrappers.push_back(&function);
     else if (function.getName().starts_with(mathPrefix)) {
       // Kept until calls have been redirected to it.
@@ -452,7 +453,7 @@ bool piko::cleanUp(ParsedUnit &unit, MemoryMap &memory,
     return false;
 
   PassRunner runner;
-  inlineCalls(wrappers, module, memory, unit.markers, runner);
+  inlineCalls(wrappers, unit, memory, runner);
   for (llvm::Function *wrapper : wrappers)
     if (!cleanUpFunction(*wrapper, unit, memory, runner, context))
       return false;

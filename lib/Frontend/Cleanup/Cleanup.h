@@ -46,7 +46,8 @@ void expandComparisons(llvm::Module &module);
 bool checkCalls(llvm::ArrayRef<llvm::Function *> functions, ParsedUnit &unit,
                 mlir::MLIRContext &context);
 
-void expandMarkers(llvm::Function &function, MemoryMap &memory);
+/// Edges and sources stay where the pipeline's wiring is read.
+void expandMarkers(llvm::Function &function, MemoryMap &memory, bool isWiring);
 
 /// Unrolls the innermost loops over the components of a vector; whether there
 /// were any.

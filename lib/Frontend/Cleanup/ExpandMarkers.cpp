@@ -20,8 +20,9 @@ namespace {
 
 class MarkerExpander {
 public:
-  MarkerExpander(llvm::Function &function, MemoryMap &memory)
-      : function(function), memory(memory), builder(function.getContext()) {}
+  MarkerExpander(llvm::Function &function, MemoryMap &memory, bool isWiring)
+      : function(function), memory(memory), isWiring(isWiring),
+        builder(function.getContext()) {}
 
   void run() {
     llvm::SmallVector<llvm::CallInst *> calls;
@@ -70,7 +71,7 @@ private:
     case MarkerKind::connect:
     case MarkerKind::allocateForSource:
       // The pipeline's constructor, run again inside a phase.
-      if (function.getName().contains("_wire_"))
+      if (isWiring)
         return;
       break;
     default:
@@ -166,11 +167,13 @@ private:
 
   llvm::Function &function;
   MemoryMap &memory;
+  bool isWiring;
   llvm::IRBuilder<> builder;
 };
 
 } // namespace
 
-void piko::expandMarkers(llvm::Function &function, MemoryMap &memory) {
-  MarkerExpander(function, memory).run();
+void piko::expandMarkers(llvm::Function &function, MemoryMap &memory,
+                         bool isWiring) {
+  MarkerExpander(function, memory, isWiring).run();
 }

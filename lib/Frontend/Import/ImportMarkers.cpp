@@ -94,21 +94,21 @@ LogicalResult PhaseImporter::importDirective(llvm::CallInst *call,
   if (phase == WrapperKind::Schedule)
     return importScheduleDirective(call, marker);
   bool isAssign = phase == WrapperKind::Assign;
-  if (isAssign && marker.kind == MarkerKind::assign)
-    return importAssignment(call, *marker.assignment);
+  if (const Assignment *assignment = getAssignment(marker.kind);
+      assignment && isAssign)
+    return importAssignment(call, *assignment);
   return fail(call) << "expected directives in the phase they are for, but "
                        "stage '"
                     << stage.name << "' has one in its "
                     << (isAssign ? "assignBin" : "process") << " phase";
 }
 
-LogicalResult
-PhaseImporter::importAssignment(llvm::CallInst *call,
-                                const marker::Assignment &assignment) {
+LogicalResult PhaseImporter::importAssignment(llvm::CallInst *call,
+                                              const Assignment &assignment) {
   mlir::OperationState state(*location, assignment.operation);
-  if (assignment.operands == marker::Assignment::Bin)
+  if (assignment.operands == Assignment::Bin)
     state.addOperands(getIndex(call, 0));
-  if (assignment.operands == marker::Assignment::TwoPoints) {
+  if (assignment.operands == Assignment::TwoPoints) {
     auto rank = static_cast<int32_t>(getRank());
     for (unsigned first : {0, 4})
       state.addOperands(

@@ -225,10 +225,9 @@ private:
   }
 
   bool buildPhase(WrapperKind kind, unsigned stage, mlir::Region &region) {
-    llvm::Function *source =
-        unit.module->getFunction(getWrapperName(kind, stage));
+    llvm::Function &source = unit.wrappers.get(*unit.module, kind, stage);
     mlir::OwningOpRef<mlir::func::FuncOp> function =
-        importPhase(*source, kind, stage, unit, memory, context);
+        importPhase(source, kind, stage, unit, memory, context);
     if (!function || failed(structurePhase(*function)))
       return false;
     region.takeBody(function->getBody());

@@ -59,7 +59,7 @@ private:
   llvm::LogicalResult importDirective(llvm::CallInst *call,
                                       const Marker &marker);
   llvm::LogicalResult importAssignment(llvm::CallInst *call,
-                                       const marker::Assignment &assignment);
+                                       const Assignment &assignment);
   llvm::LogicalResult importScheduleDirective(llvm::CallInst *call,
                                               const Marker &marker);
 

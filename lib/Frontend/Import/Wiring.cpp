@@ -63,7 +63,7 @@ public:
 
 private:
   llvm::Function &getWrapper(WrapperKind kind, unsigned index) {
-    return *unit.module->getFunction(getWrapperName(kind, index));
+    return unit.wrappers.get(*unit.module, kind, index);
   }
   InFlightDiagnostic fail(const llvm::CallInst *call) {
     return emitUserError(call, unit, context);
@@ -229,14 +229,16 @@ private:
   // Schedules
   //===--------------------------------------------------------------------===//
 
-  struct Directive {
+  struct Said {
     const llvm::CallInst *call;
     const Marker *marker;
+    const Directive *directive;
+    bool mayDiffer() const { return directive->varies != Directive::Stage; }
   };
 
   bool readSchedule(unsigned index, StageDescription &stage) {
     llvm::Function &function = getWrapper(WrapperKind::Schedule, index);
-    llvm::SmallVector<Directive> directives;
+    llvm::SmallVector<Said> directives;
     for (llvm::Instruction &instruction : llvm::instructions(function)) {
       auto *call = dyn_cast<llvm::CallInst>(&instruction);
       if (!call)
@@ -249,18 +251,18 @@ private:
     }
     Once once(function);
     ScheduleDescription &schedule = stage.schedule;
-    for (Directive directive : directives)
-      schedule.isDynamic |=
-          mayDiffer(*directive.marker) && !isConstant(directive.call, once);
-    for (auto [call, marker] : directives) {
-      if (mayDiffer(*marker) && schedule.isDynamic)
+    for (const Said &said : directives)
+      schedule.isDynamic |= said.mayDiffer() && !isConstant(said.call, once);
+    for (const Said &said : directives) {
+      if (said.mayDiffer() && schedule.isDynamic)
         continue; // It stays in the phase's code.
-      if (!mayDiffer(*marker) && !once.contains(call->getParent())) {
-        fail(call) << "expected " << getDirectiveName(*marker)
-                   << " for every bin, because it may not depend on the bin";
+      if (!said.mayDiffer() && !once.contains(said.call->getParent())) {
+        fail(said.call)
+            << "expected " << said.directive->said
+            << " for every bin, because it may not depend on the bin";
         return false;
       }
-      if (!readDirective(call, *marker, schedule))
+      if (!readDirective(said.call, *said.marker, schedule))
         return false;
     }
     // It is accepted, and has no effect.
@@ -277,24 +279,11 @@ private:
            name.starts_with(accessor::atomic) ||
            name.starts_with(accessor::atomicFetch);
   }
-  /// Whether a directive may depend on the bin and on constants.
-  static bool mayDiffer(const Marker &marker) {
-    return marker.kind == MarkerKind::schedule ||
-           marker.kind == MarkerKind::batch ||
-           marker.kind == MarkerKind::everyBin;
-  }
   static bool isConstant(const llvm::CallInst *call, const Once &once) {
     return once.contains(call->getParent()) &&
            llvm::all_of(call->args(), [](const llvm::Value *argument) {
              return llvm::isa<llvm::ConstantInt>(argument);
            });
-  }
-  static llvm::StringRef getDirectiveName(const Marker &marker) {
-    return marker.kind == MarkerKind::endStage    ? "endStage"
-           : marker.kind == MarkerKind::endBin    ? "endBin"
-           : marker.kind == MarkerKind::lanes     ? "specifyLanes"
-           : marker.kind == MarkerKind::precision ? "specifyPrecision"
-                                                  : "specifyOrder";
   }
   bool failPhase(const llvm::CallInst *call, const StageDescription &stage) {
     fail(call) << "expected only directives in the schedule phase of stage '"
@@ -305,28 +294,20 @@ private:
   /// Collects directives and reports what is none; false after an error.
   bool classify(const llvm::CallInst *call, const Marker &marker,
                 const StageDescription &stage,
-                llvm::SmallVectorImpl<Directive> &directives) {
+                llvm::SmallVectorImpl<Said> &directives) {
+    if (const Directive *directive = getDirective(marker.kind)) {
+      directives.push_back({call, &marker, directive});
+      if (stage.takesList || directive->varies != Directive::ListBin)
+        return true;
+      fail(call) << "expected " << directive->said
+                 << " in a stage whose process takes a list, but that of "
+                    "stage '"
+                 << stage.name << "' does not";
+      return false;
+    }
+    if (getAssignment(marker.kind))
+      return failPhase(call, stage);
     switch (marker.kind) {
-    case MarkerKind::batch:
-    case MarkerKind::everyBin:
-      if (!stage.takesList) {
-        fail(call) << "expected "
-                   << (marker.kind == MarkerKind::batch ? "batch" : "everyBin")
-                   << " in a stage whose process takes a list, but that of "
-                      "stage '"
-                   << stage.name << "' does not";
-        return false;
-      }
-      [[fallthrough]];
-    case MarkerKind::schedule:
-    case MarkerKind::endStage:
-    case MarkerKind::endBin:
-    case MarkerKind::order:
-    case MarkerKind::lanes:
-    case MarkerKind::precision:
-      directives.push_back({call, &marker});
-      return true;
-    case MarkerKind::assign:
     case MarkerKind::loopMore:
     case MarkerKind::sync:
     case MarkerKind::sort:

@@ -251,7 +251,8 @@ private:
     pipeline.typeName =
         made->records.getName(ast.getCanonicalTagType(pipe.type));
     made->suffix = "_of_" + std::to_string(readers.size());
-    wrappers += generateWrappers(pipeline, pipeline.typeName, made->suffix);
+    wrappers += generateWrappers(pipeline, pipeline.typeName, made->suffix,
+                                 made->unit->wrappers);
     readers.push_back(std::move(made));
     return true;
   }
@@ -306,9 +307,6 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
     marker.isReadOnly = (*arguments)[0].getAsType().isConstQualified();
     break;
   }
-  case MarkerKind::assign:
-    marker.assignment = getAssignment(function->getName());
-    break;
   case MarkerKind::state:
     marker.offset = reader.reader.getStateOffset((*arguments)[0].getAsType());
     break;
@@ -379,8 +377,7 @@ static bool readFunctions(clang::CodeGenerator &generator, UnitReader &reader) {
 }
 
 /// Warns about what is C++ and is hardly meant.
-static void warnAboutText(const llvm::Module &module,
-                          clang::CodeGenerator &generator,
+static void warnAboutText(clang::CodeGenerator &generator,
                           llvm::ArrayRef<std::unique_ptr<UnitReader>> readers,
                           clang::ASTContext &ast, mlir::MLIRContext &context) {
   llvm::SetVector<const clang::CXXRecordDecl *> stages;
@@ -393,10 +390,10 @@ static void warnAboutText(const llvm::Module &module,
                             context);
   }
   std::vector<const clang::FunctionDecl *> wrappers;
-  for (const llvm::Function &function : module)
-    if (function.getName().starts_with("__piko_wrapper_"))
+  for (const std::unique_ptr<UnitReader> &reader : readers)
+    for (const auto &[name, wrapper] : reader->unit->wrappers)
       if (const auto *decl = llvm::dyn_cast_or_null<clang::FunctionDecl>(
-              generator.GetDeclForMangledName(function.getName())))
+              generator.GetDeclForMangledName(name + reader->suffix)))
         wrappers.push_back(decl);
   warnAboutEvaluationOrder(wrappers, ast, context);
 }
@@ -536,8 +533,7 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   if (!module)
     return llvm::failure();
   adaptModule(*module);
-  warnAboutText(*module, *generator, reader.readers, compiler.getASTContext(),
-                context);
+  warnAboutText(*generator, reader.readers, compiler.getASTContext(), context);
   llvm::StringSet<> userFiles;
   collectUserFiles(sources, userFiles);
   for (std::unique_ptr<UnitReader> &made : reader.readers) {

@@ -4,6 +4,7 @@
 #define PIKO_LIB_FRONTEND_PARSE_PARSE_H
 
 #include "Parse/PipelineReader.h"
+#include "Parse/Wrappers.h"
 #include "Piko/Frontend/Frontend.h"
 #include "Support/Markers.h"
 #include "llvm/ADT/StringSet.h"
@@ -33,6 +34,7 @@ struct ParsedUnit {
   std::shared_ptr<llvm::LLVMContext> llvmContext;
   /// The wrappers and all they need; null if the pipeline has an error.
   std::unique_ptr<llvm::Module> module;
+  WrapperTable wrappers;
   /// The meaning of the module's functions without a body.
   MarkerTable markers;
   /// What a user calls a function, by its name in the module.

@@ -8,25 +8,41 @@
 
 #include "Parse/Wrappers.h"
 
+#include "llvm/IR/Module.h"
 #include "llvm/Support/raw_ostream.h"
 
 using namespace piko;
 
-std::string piko::getWrapperName(WrapperKind kind, unsigned index) {
-  static const char *const names[] = {"wire", "assign", "schedule", "process",
-                                      "clear"};
-  return std::string("__piko_wrapper_") + names[static_cast<int>(kind)] + "_" +
-         std::to_string(index);
+llvm::StringRef WrapperTable::add(WrapperKind kind, unsigned index) {
+  wrappers.push_back(
+      {"__piko_wrapper_" + std::to_string(wrappers.size()), {kind, index}});
+  return wrappers.back().first;
+}
+
+const Wrapper *WrapperTable::lookup(const llvm::Function &function) const {
+  for (const auto &[name, wrapper] : wrappers)
+    if (name == function.getName())
+      return &wrapper;
+  return nullptr;
+}
+
+llvm::Function &WrapperTable::get(llvm::Module &module, WrapperKind kind,
+                                  unsigned index) const {
+  for (const auto &[name, wrapper] : wrappers)
+    if (wrapper.kind == kind && wrapper.index == index)
+      return *module.getFunction(name);
+  llvm_unreachable("expected a wrapper that was generated");
 }
 
 std::string piko::generateWrappers(const PipelineDescription &pipeline,
                                    llvm::StringRef typeName,
-                                   llvm::StringRef suffix) {
+                                   llvm::StringRef suffix,
+                                   WrapperTable &wrappers) {
   std::string text;
   llvm::raw_string_ostream out(text);
   auto function = [&](WrapperKind kind, unsigned index, llvm::Twine body,
                       llvm::Twine phase = "") {
-    out << "extern \"C\" void " << getWrapperName(kind, index) << suffix
+    out << "extern \"C\" void " << wrappers.add(kind, index) << suffix
         << "() { " << body << " }" << wrapperComment << phase << "\n";
   };
   out << "namespace __piko_wrappers" << suffix << " {\n";

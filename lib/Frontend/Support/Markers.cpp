@@ -10,35 +10,52 @@
 
 using namespace piko;
 
-const marker::Assignment *piko::getAssignment(llvm::StringRef name) {
-  const auto *found =
-      llvm::find_if(marker::assignments, [&](const auto &assignment) {
-        return name == assignment.marker;
-      });
-  return found == std::end(marker::assignments) ? nullptr : found;
+std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
+  return llvm::StringSwitch<std::optional<MarkerKind>>(name)
+#define PIKO_MARKER(EFFECT, RESULT, NAME, ...) .Case(#NAME, MarkerKind::NAME)
+#include "piko/markers.def"
+      .Default(std::nullopt);
 }
 
-std::optional<MarkerKind> piko::getMarkerKind(llvm::StringRef name) {
-  if (getAssignment(name))
-    return MarkerKind::assign;
-#define MARKER(NAME) .Case(#NAME, MarkerKind::NAME)
-  return llvm::StringSwitch<std::optional<MarkerKind>>(name) MARKER(state)
-      MARKER(input) MARKER(element) MARKER(listSize) MARKER(listAt)
-          MARKER(extent) MARKER(imageExtent) MARKER(emit) MARKER(updateBegin)
-              MARKER(updateEnd) MARKER(atomic) MARKER(atomicFetch) MARKER(
-                  reduceBegin) MARKER(scanBegin) MARKER(combineEnd) MARKER(sort)
-                  MARKER(loopFirst) MARKER(loopMore) MARKER(loopNext) MARKER(
-                      cellsOf) MARKER(cellAt) MARKER(sync) MARKER(bin)
-                      MARKER(floatPosition) MARKER(binAt) MARKER(binLo)
-                          MARKER(binHi) MARKER(domain) MARKER(schedule)
-                              MARKER(endStage) MARKER(endBin) MARKER(batch)
-                                  MARKER(everyBin) MARKER(order) MARKER(lanes)
-                                      MARKER(precision) MARKER(source)
-                                          MARKER(connect)
-                                              MARKER(allocateForSource)
-                                                  MARKER(phase) MARKER(clear)
-                                                      .Default(std::nullopt);
-#undef MARKER
+/// The row of a table that is about a marker.
+template <class Row, size_t count>
+static const Row *findRow(const Row (&table)[count], MarkerKind marker) {
+  const Row *found = llvm::find_if(
+      table, [&](const Row &row) { return row.marker == marker; });
+  return found == std::end(table) ? nullptr : found;
+}
+
+const Assignment *piko::getAssignment(MarkerKind marker) {
+  static constexpr Assignment assignments[] = {
+#define PIKO_ASSIGNMENT(NAME, OPERATION, OPERANDS)                             \
+  {MarkerKind::NAME, OPERATION, Assignment::OPERANDS},
+#include "piko/markers.def"
+  };
+  return findRow(assignments, marker);
+}
+
+const Directive *piko::getDirective(MarkerKind marker) {
+  static constexpr Directive directives[] = {
+#define PIKO_DIRECTIVE(NAME, SAID, VARIES, ...)                                \
+  {MarkerKind::NAME, #SAID, Directive::VARIES},
+#include "piko/markers.def"
+  };
+  return findRow(directives, marker);
+}
+
+namespace {
+/// What LLVM may think of a marker; see piko/markers.def.
+enum class MarkerEffect { Place, Value, Loop, InPlace, Opaque };
+} // namespace
+
+static MarkerEffect getEffect(MarkerKind marker) {
+  switch (marker) {
+#define PIKO_MARKER(EFFECT, RESULT, NAME, ...)                                 \
+  case MarkerKind::NAME:                                                       \
+    return MarkerEffect::EFFECT;
+#include "piko/markers.def"
+  }
+  llvm_unreachable("all markers are listed");
 }
 
 const Marker *piko::getMarker(const llvm::CallBase *call,
@@ -64,40 +81,23 @@ void piko::setMarkerEffects(llvm::Module &module, const MarkerTable &markers) {
     function.setAttributes({});
     function.setDoesNotThrow();
     function.setWillReturn();
-    switch (found->second.kind) {
-    case MarkerKind::state:
-    case MarkerKind::input:
-    case MarkerKind::element:
-    case MarkerKind::listAt:
-      function.setDoesNotAccessMemory();
+    switch (getEffect(found->second.kind)) {
+    case MarkerEffect::Place:
       function.addRetAttr(llvm::Attribute::NonNull);
-      break;
-    case MarkerKind::listSize:
-    case MarkerKind::extent:
-    case MarkerKind::imageExtent:
-    case MarkerKind::bin:
-    case MarkerKind::floatPosition:
-    case MarkerKind::binAt:
-    case MarkerKind::binLo:
-    case MarkerKind::binHi:
-    case MarkerKind::domain:
-    case MarkerKind::cellsOf:
-    case MarkerKind::cellAt:
+      [[fallthrough]];
+    case MarkerEffect::Value:
       function.setDoesNotAccessMemory();
       break;
-    case MarkerKind::loopFirst:
-    case MarkerKind::loopMore:
-    case MarkerKind::loopNext:
+    case MarkerEffect::Loop:
       function.setDoesNotAccessMemory();
       setInPlace(function);
       break;
-    case MarkerKind::phase:
-    case MarkerKind::assign:
+    case MarkerEffect::Opaque:
       function.setOnlyAccessesInaccessibleMemory();
-      [[fallthrough]];
-    default:
-      // What they read and write is seen by nothing else in the module, but
-      // they stay where they are, and as many as they are.
+      setInPlace(function);
+      break;
+    case MarkerEffect::InPlace:
+      // What they read and write is seen by nothing else in the module.
       setInPlace(function);
       break;
     }

@@ -3,7 +3,6 @@
 #ifndef PIKO_LIB_FRONTEND_SUPPORT_MARKERS_H
 #define PIKO_LIB_FRONTEND_SUPPORT_MARKERS_H
 
-#include "piko/markers.h"
 #include "llvm/ADT/SmallVector.h"
 #include "llvm/ADT/StringRef.h"
 
@@ -19,56 +18,33 @@ class Module;
 
 namespace piko {
 
-/// One for each function in namespace piko::marker, by the same name; and one
-/// for all that assign.
+/// One for each function in namespace piko::marker, by the same name.
 enum class MarkerKind {
-  state,
-  input,
-  element,
-  listSize,
-  listAt,
-  extent,
-  imageExtent,
-  emit,
-  updateBegin,
-  updateEnd,
-  atomic,
-  atomicFetch,
-  loopFirst,
-  loopMore,
-  loopNext,
-  cellsOf,
-  cellAt,
-  sync,
-  reduceBegin,
-  scanBegin,
-  combineEnd,
-  sort,
-  bin,
-  floatPosition,
-  binAt,
-  binLo,
-  binHi,
-  domain,
-  assign, ///< one of piko::marker::assignments
-  schedule,
-  endStage,
-  endBin,
-  batch,
-  everyBin,
-  order,
-  lanes,
-  precision,
-  source,
-  connect,
-  allocateForSource,
-  phase,
-  clear,
+#define PIKO_MARKER(EFFECT, RESULT, NAME, ...) NAME,
+#include "piko/markers.def"
 };
 
 std::optional<MarkerKind> getMarkerKind(llvm::StringRef name);
-/// What a marker assigns; null if it does not.
-const marker::Assignment *getAssignment(llvm::StringRef name);
+
+/// What assigns a primitive to bins, and the operation that it becomes.
+struct Assignment {
+  MarkerKind marker;
+  llvm::StringLiteral operation;
+  enum Operands { Nothing, Bin, TwoPoints } operands;
+};
+/// Null for a marker that is none.
+const Assignment *getAssignment(MarkerKind marker);
+
+/// What a schedule phase may say.
+struct Directive {
+  MarkerKind marker;
+  llvm::StringLiteral said; ///< what a text calls it
+  /// For what it may be another: for nothing, for each bin, or for each bin in
+  /// a stage that takes a list.
+  enum Varies { Stage, AnyBin, ListBin } varies;
+};
+/// Null for a marker that is none.
+const Directive *getDirective(MarkerKind marker);
 
 struct Marker {
   MarkerKind kind;
@@ -81,7 +57,6 @@ struct Marker {
   bool isSigned = false;
   /// state: where what it gives begins in the pipeline's state.
   int64_t offset = 0;
-  const marker::Assignment *assignment = nullptr;
   /// endStage: the stages of that type, by number.
   llvm::SmallVector<unsigned, 1> stages = {};
 };

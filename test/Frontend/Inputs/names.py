@@ -59,7 +59,7 @@ def identifiers(folder):
     for header in sorted(folder.rglob("piko*")):
         if header.suffix == ".h" and "pikort" not in header.parts:
             found |= set(re.findall(r"[A-Za-z_]\w*", header.read_text()))
-    for header in sorted((folder / "piko").rglob("*.h")):
+    for header in sorted((folder / "piko").rglob("*.[hd]*")):
         found |= set(re.findall(r"[A-Za-z_]\w*", header.read_text()))
     return found
 
