@@ -79,8 +79,9 @@ static bool isInLanguage(const clang::Diagnostic &info) {
   if (!info.hasSourceManager() || !info.getLocation().isValid())
     return false;
   const clang::SourceManager &sources = info.getSourceManager();
-  return sources.getFilename(sources.getExpansionLoc(info.getLocation()))
-      .contains("/piko/compiled/");
+  llvm::StringRef file =
+      sources.getFilename(sources.getExpansionLoc(info.getLocation()));
+  return file.contains("/piko/compiled/") || file.ends_with("/piko/stage.h");
 }
 
 /// What a failed assertion in these headers says; empty for another error.

@@ -92,6 +92,15 @@ template <int Rank> using Position = glm::vec<Rank, float, glm::defaultp>;
 
 namespace detail {
 
+template <class T, class U> inline constexpr bool isSame = false;
+template <class T> inline constexpr bool isSame<T, T> = true;
+template <class T, class...> struct First {
+  using type = T;
+};
+template <class T> struct Identity {
+  using type = T;
+};
+
 struct OnlyCell : Cells<1> {
   OnlyCell(int x) : Cells<1>(x) {}
   OnlyCell(const Cells<1> &at) : Cells<1>(at) {}
@@ -114,6 +123,29 @@ inline int32_t cellOf(float p) {
   if (!(f >= -2147483648.0f))
     return INT32_MIN;
   return f >= 2147483648.0f ? INT32_MAX : static_cast<int32_t>(f);
+}
+
+/// Of what `get` gives for each dimension.
+template <int Rank, class F> Cells<Rank> makeCells(F get) {
+  if constexpr (Rank == 1)
+    return Cells<1>(get(0));
+  else if constexpr (Rank == 2)
+    return Cells<2>(get(0), get(1));
+  else if constexpr (Rank == 3)
+    return Cells<3>(get(0), get(1), get(2));
+  else
+    return Cells<4>(get(0), get(1), get(2), get(3));
+}
+
+template <int Rank> Cells<Rank> cellsOf(const Position<Rank> &p) {
+  if constexpr (Rank == 1)
+    return Cells<1>(cellOf(p.x));
+  else if constexpr (Rank == 2)
+    return Cells<2>(cellOf(p.x), cellOf(p.y));
+  else if constexpr (Rank == 3)
+    return Cells<3>(cellOf(p.x), cellOf(p.y), cellOf(p.z));
+  else
+    return Cells<4>(cellOf(p.x), cellOf(p.y), cellOf(p.z), cellOf(p.w));
 }
 
 /// What a braced list of numbers means: cells, or a position if they have

@@ -8,8 +8,7 @@
 #define PIKO_COMPILED_PIKO_H
 
 #include <piko/compiled/math.h>
-#include <piko/compiled/stage.h>
-#include <piko/compiled/state.h>
+#include <piko/stage.h>
 
 namespace piko {
 

@@ -28,15 +28,6 @@ template <int D, int Rank> inline int64_t coordinate(const Cells<Rank> &at) {
     return at.w;
 }
 
-template <class T, class U> inline constexpr bool isSame = false;
-template <class T> inline constexpr bool isSame<T, T> = true;
-template <class T, class...> struct First {
-  using type = T;
-};
-template <class T> struct Identity {
-  using type = T;
-};
-
 } // namespace detail
 
 template <class T> class Buffer final {
@@ -86,14 +77,7 @@ public:
   }
   void store(const Cells<Rank> &at, const T &value) { *pixel<T>(at) = value; }
   Cells<Rank> extent() const {
-    if constexpr (Rank == 1)
-      return Cells<1>(extent(0));
-    else if constexpr (Rank == 2)
-      return Cells<2>(extent(0), extent(1));
-    else if constexpr (Rank == 3)
-      return Cells<3>(extent(0), extent(1), extent(2));
-    else
-      return Cells<4>(extent(0), extent(1), extent(2), extent(3));
+    return detail::makeCells<Rank>([this](int dim) { return extent(dim); });
   }
 
 private:

@@ -129,16 +129,6 @@ inline void assignLine(const Cell &a, const Cell &b, int rank,
               });
 }
 
-/// Fails if one of the positions of an assignment is NaN.
-template <class V>
-void expectNumbers(const char *what, const V &a, const V &b,
-                   const SourcePlace &at) {
-  for (int d = 0; d < V::length(); ++d)
-    if (a[d] != a[d] || b[d] != b[d])
-      frameAt(what, at).node->fail(
-          -1, "expected positions of numbers, but got NaN");
-}
-
 inline void checkOwnPixel(const CallFrame &call, const Cell &at, int rank) {
   Cell lo = call.node->grid.lo(call.bin);
   Cell hi = call.node->grid.hi(call.bin);

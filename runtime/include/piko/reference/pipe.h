@@ -7,7 +7,7 @@
 
 #include <piko/arithmetic.h>
 #include <piko/reference/check.h>
-#include <piko/reference/stage.h>
+#include <piko/stage.h>
 
 namespace piko {
 namespace reference {
