@@ -173,11 +173,11 @@ private:
                                            "PIKOIR_SERIALIZE", "PIKOIR_ALL"};
     const ScheduleDescription &schedule = stage.schedule;
     int flags = 0;
-    if (!schedule.endStage.empty() || schedule.endBin || stage.takesList)
+    if (schedule.says("endStage") || schedule.says("endBin") || stage.takesList)
       flags |= 1; // PIKOIR_COLLECTS
     if (stage.takesList)
       flags |= 16; // PIKOIR_LIST
-    if (schedule.unordered)
+    if (schedule.says("unordered"))
       flags |= 8; // PIKOIR_UNORDERED
     out << "  static const int64_t bins" << id << "[] = {"
         << llvm::join(
@@ -187,8 +187,8 @@ private:
         << "};\n"
         << "  pikoir_declare_stage(p, " << id << ", " << quote(stage.name)
         << ", " << stage.input << ", bins" << id << ", "
-        << policies[static_cast<int>(schedule.getPolicy())] << ", "
-        << schedule.tileSplit << ", " << flags << ", 0);\n";
+        << policies[static_cast<int>(schedule.getNumber("kind"))] << ", "
+        << schedule.getNumber("tileSplit") << ", " << flags << ", 0);\n";
   }
 
   void writeRun() {

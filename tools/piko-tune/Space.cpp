@@ -76,9 +76,10 @@ struct SpaceReader {
 
 /// Whether a schedule says where bins run, and nothing else.
 static bool saysOnlyWhere(const ScheduleDescription &schedule) {
-  return schedule.policy && !schedule.batch && schedule.endStage.empty() &&
-         !schedule.endBin && !schedule.everyBin && !schedule.unordered &&
-         !schedule.lanes;
+  return schedule.says("kind") &&
+         llvm::all_of(schedule.ofSchedule, [](mlir::NamedAttribute said) {
+           return said.getName() == "kind" || said.getName() == "tileSplit";
+         });
 }
 
 /// What cannot be set is not tried, as far as the text shows it.

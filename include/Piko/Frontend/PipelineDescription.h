@@ -9,7 +9,8 @@
 #ifndef PIKO_FRONTEND_PIPELINEDESCRIPTION_H
 #define PIKO_FRONTEND_PIPELINEDESCRIPTION_H
 
-#include "mlir/IR/Location.h"
+#include "mlir/IR/BuiltinAttributes.h"
+#include "mlir/IR/OperationSupport.h"
 #include "llvm/ADT/SmallVector.h"
 
 #include <cstdint>
@@ -93,31 +94,27 @@ struct StateDescription {
   bool hasClear() const { return kind == Image || hasValue; }
 };
 
-enum class SchedulePolicy { LoadBalance, DirectMap, Serialize, All };
-
+/// What directives say that is the same for all bins, as attributes of the
+/// operations of a stage; see piko/markers.def.
 struct ScheduleDescription {
-  std::optional<SchedulePolicy> policy; ///< none where the text has none
-  int64_t tileSplit = 0, batch = 0;
-  std::vector<unsigned> endStage;
-  bool endBin = false, everyBin = false, unordered = false;
-  /// Whether the policy, the tile split, batch and everyBin depend on the bin
-  /// or on constants: then the schedule phase is code.
+  mlir::NamedAttrList ofStage, ofSchedule, ofProcess;
+  /// Whether a directive depends on the bin or on constants: then the schedule
+  /// phase is code.
   bool isDynamic = false;
-  /// What lanes are given, as piko::Lanes has it, and where the text says so.
-  std::optional<int64_t> lanes = std::nullopt;
+  /// Where the text says what lanes are given.
   std::optional<mlir::Location> lanesLocation = std::nullopt;
-  /// As piko::Precision has it. It is the process phase's, and says nothing of
-  /// where and when that runs.
-  int64_t precision = 0;
 
-  SchedulePolicy getPolicy() const {
-    return policy.value_or(SchedulePolicy::LoadBalance);
+  bool says(llvm::StringRef attribute) const {
+    return bool(ofSchedule.get(attribute));
   }
-  /// Whether the text says nothing.
-  bool isEmpty() const {
-    return !policy && !batch && endStage.empty() && !endBin && !everyBin &&
-           !unordered && !isDynamic && !lanes;
+  /// 0 where it says none.
+  int64_t getNumber(llvm::StringRef attribute) const {
+    auto number =
+        llvm::dyn_cast_or_null<mlir::IntegerAttr>(ofSchedule.get(attribute));
+    return number ? number.getInt() : 0;
   }
+  /// Whether the schedule phase says nothing.
+  bool isEmpty() const { return ofSchedule.empty() && !isDynamic; }
 };
 
 struct StageDescription {

@@ -120,23 +120,15 @@ LogicalResult PhaseImporter::importAssignment(llvm::CallInst *call,
   return success();
 }
 
-/// Those that are the same for all bins are read by readWiring.
+/// Those that are the same for all bins are read by readDirectives.
 LogicalResult PhaseImporter::importScheduleDirective(llvm::CallInst *call,
                                                      const Marker &marker) {
-  auto number = [&](unsigned operand) {
-    return scalars.get(call->getArgOperand(operand));
-  };
-  switch (marker.kind) {
-  case MarkerKind::schedule:
-    make<SetScheduleOp>(number(0), number(1));
+  const Directive *directive = getDirective(marker.kind);
+  if (!directive || directive->varies == Directive::Stage)
     return success();
-  case MarkerKind::batch:
-    make<SetBatchOp>(number(0));
-    return success();
-  case MarkerKind::everyBin:
-    make<SetEveryBinOp>();
-    return success();
-  default:
-    return success();
-  }
+  mlir::OperationState state(*location, directive->getOperation());
+  for (llvm::Value *operand : call->args())
+    state.addOperands(scalars.get(operand));
+  builder.create(state);
+  return success();
 }

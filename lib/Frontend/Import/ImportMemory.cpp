@@ -399,7 +399,7 @@ static AtomicKind getAtomicKind(llvm::CallInst *call) {
 
 LogicalResult MemoryImporter::expectUnordered(llvm::CallInst *call,
                                               bool isFetch) {
-  if (stage.schedule.unordered)
+  if (stage.schedule.says("unordered"))
     return success();
   return fail(call) << "expected "
                     << (isFetch ? "an atomic that returns the old value"

@@ -171,11 +171,9 @@ private:
         builder, stage.location, builder.getStringAttr(stage.symbol),
         builder.getDenseI64ArrayAttr(stage.bins),
         builder.getI64IntegerAttr(stage.threads), getRecordName(stage.input),
-        builder.getArrayAttr(outputs), /*lineage=*/nullptr, /*tile=*/nullptr,
-        /*split=*/nullptr, /*ordered=*/nullptr,
-        /*placed=*/nullptr, /*writes=*/nullptr,
-        stage.takesList ? builder.getUnitAttr() : mlir::UnitAttr(),
-        /*fused=*/nullptr);
+        builder.getArrayAttr(outputs));
+    op.setTakesList(stage.takesList);
+    setAttributes(op, stage.schedule.ofStage);
     if (stage.symbol != stage.name)
       op->setAttr(cppNameAttr, builder.getStringAttr(stage.name));
     builder.createBlock(&op.getBody());
@@ -187,13 +185,16 @@ private:
     }
     if (!buildSchedule(number))
       return false;
-    PrecisionAttr precision;
-    if (auto said = static_cast<Precision>(stage.schedule.precision);
-        said != Precision::Strict)
-      precision = PrecisionAttr::get(&context, said);
-    auto process =
-        ProcessOp::create(builder, *stage.processLocation, nullptr, precision);
+    auto process = ProcessOp::create(builder, *stage.processLocation, nullptr,
+                                     /*precision=*/nullptr);
+    setAttributes(process, stage.schedule.ofProcess);
     return buildPhase(WrapperKind::Process, number, process.getBody());
+  }
+
+  static void setAttributes(mlir::Operation *op,
+                            const mlir::NamedAttrList &attributes) {
+    for (mlir::NamedAttribute attribute : attributes)
+      op->setAttr(attribute.getName(), attribute.getValue());
   }
 
   bool buildSchedule(unsigned stageNumber) {
@@ -201,25 +202,11 @@ private:
     const ScheduleDescription &schedule = stage.schedule;
     if (schedule.isEmpty())
       return true;
-    llvm::SmallVector<mlir::Attribute> waits;
-    for (unsigned other : schedule.endStage)
-      waits.push_back(mlir::FlatSymbolRefAttr::get(
-          &context, pipeline.stages[other].symbol));
-    auto number = [&](int64_t value) {
-      return value ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
-    };
-    LaneMappingAttr lanes;
-    if (schedule.lanes)
-      lanes = LaneMappingAttr::get(&context,
-                                   static_cast<LaneMapping>(*schedule.lanes));
     // Whether the lanes are possible is found much later.
     auto op = ScheduleOp::create(
         builder, schedule.lanesLocation.value_or(stage.location),
-        static_cast<ScheduleKind>(schedule.getPolicy()),
-        number(schedule.tileSplit),
-        waits.empty() ? mlir::ArrayAttr() : builder.getArrayAttr(waits),
-        schedule.endBin, /*after=*/false, number(schedule.batch),
-        schedule.everyBin, schedule.unordered, /*resolved=*/false, lanes);
+        ScheduleKind::LoadBalance);
+    setAttributes(op, schedule.ofSchedule);
     return !schedule.isDynamic ||
            buildPhase(WrapperKind::Schedule, stageNumber, op.getBody());
   }

@@ -1,21 +1,19 @@
 //===- Wiring.cpp - What a pipeline's code says once ----------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Directives are read from simplified IR, where templates, `if constexpr` and
-// helper functions are gone: a marker that is called unconditionally with
-// constant arguments is a fact about the pipeline.
+// It is read from simplified IR, where templates, `if constexpr` and helper
+// functions are gone: a marker that is called unconditionally with constant
+// arguments is a fact about the pipeline.
 //
 //===----------------------------------------------------------------------===//
 
 #include "Import/Wiring.h"
 
-#include "Parse/Wrappers.h"
+#include "Import/Directives.h"
 #include "Support/Accessors.h"
 #include "Support/CallChain.h"
 #include "mlir/IR/Diagnostics.h"
 #include "llvm/ADT/PostOrderIterator.h"
-#include "llvm/Analysis/LoopInfo.h"
-#include "llvm/Analysis/PostDominators.h"
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
@@ -26,24 +24,6 @@ using mlir::InFlightDiagnostic;
 
 namespace {
 
-/// Tells which blocks run once, after and beside loops that fill members.
-class Once {
-public:
-  explicit Once(llvm::Function &function)
-      : entry(function.getEntryBlock()), begins(function), ends(function),
-        loops(begins) {}
-
-  bool contains(const llvm::BasicBlock *block) const {
-    return ends.dominates(block, &entry) && !loops.getLoopFor(block);
-  }
-
-private:
-  llvm::BasicBlock &entry;
-  llvm::DominatorTree begins;
-  llvm::PostDominatorTree ends;
-  llvm::LoopInfo loops;
-};
-
 class WiringReader {
 public:
   WiringReader(ParsedUnit &unit, MemoryMap &memory, mlir::MLIRContext &context)
@@ -53,7 +33,9 @@ public:
     if (!readGraph() || !checkGraph())
       return false;
     for (auto [index, stage] : llvm::enumerate(pipeline.stages))
-      if (stage.hasSchedule && !readSchedule(index, stage))
+      if (stage.hasSchedule &&
+          !readDirectives(getWrapper(WrapperKind::Schedule, index), stage, unit,
+                          context))
         return false;
     for (auto [index, state] : llvm::enumerate(pipeline.state))
       if (state.hasClear() && !state.isEvaluated && !readClear(index, state))
@@ -223,162 +205,6 @@ private:
           ok = false;
         }
     return ok;
-  }
-
-  //===--------------------------------------------------------------------===//
-  // Schedules
-  //===--------------------------------------------------------------------===//
-
-  struct Said {
-    const llvm::CallInst *call;
-    const Marker *marker;
-    const Directive *directive;
-    bool mayDiffer() const { return directive->varies != Directive::Stage; }
-  };
-
-  bool readSchedule(unsigned index, StageDescription &stage) {
-    llvm::Function &function = getWrapper(WrapperKind::Schedule, index);
-    llvm::SmallVector<Said> directives;
-    for (llvm::Instruction &instruction : llvm::instructions(function)) {
-      auto *call = dyn_cast<llvm::CallInst>(&instruction);
-      if (!call)
-        continue;
-      const Marker *marker = getMarker(call, unit.markers);
-      if (!marker && isEffect(call->getCalledFunction()->getName()))
-        return failPhase(call, stage);
-      if (marker && !classify(call, *marker, stage, directives))
-        return false;
-    }
-    Once once(function);
-    ScheduleDescription &schedule = stage.schedule;
-    for (const Said &said : directives)
-      schedule.isDynamic |= said.mayDiffer() && !isConstant(said.call, once);
-    for (const Said &said : directives) {
-      if (said.mayDiffer() && schedule.isDynamic)
-        continue; // It stays in the phase's code.
-      if (!said.mayDiffer() && !once.contains(said.call->getParent())) {
-        fail(said.call)
-            << "expected " << said.directive->said
-            << " for every bin, because it may not depend on the bin";
-        return false;
-      }
-      if (!readDirective(said.call, *said.marker, schedule))
-        return false;
-    }
-    // It is accepted, and has no effect.
-    if (schedule.getPolicy() != SchedulePolicy::All)
-      schedule.tileSplit = 0;
-    return true;
-  }
-
-  /// Whether an accessor changes something.
-  static bool isEffect(llvm::StringRef name) {
-    return name == accessor::emit || name == accessor::updateBegin ||
-           name == accessor::reduceBegin || name == accessor::scanBegin ||
-           name.starts_with(accessor::store) ||
-           name.starts_with(accessor::atomic) ||
-           name.starts_with(accessor::atomicFetch);
-  }
-  static bool isConstant(const llvm::CallInst *call, const Once &once) {
-    return once.contains(call->getParent()) &&
-           llvm::all_of(call->args(), [](const llvm::Value *argument) {
-             return llvm::isa<llvm::ConstantInt>(argument);
-           });
-  }
-  bool failPhase(const llvm::CallInst *call, const StageDescription &stage) {
-    fail(call) << "expected only directives in the schedule phase of stage '"
-               << stage.name << "'";
-    return false;
-  }
-
-  /// Collects directives and reports what is none; false after an error.
-  bool classify(const llvm::CallInst *call, const Marker &marker,
-                const StageDescription &stage,
-                llvm::SmallVectorImpl<Said> &directives) {
-    if (const Directive *directive = getDirective(marker.kind)) {
-      directives.push_back({call, &marker, directive});
-      if (stage.takesList || directive->varies != Directive::ListBin)
-        return true;
-      fail(call) << "expected " << directive->said
-                 << " in a stage whose process takes a list, but that of "
-                    "stage '"
-                 << stage.name << "' does not";
-      return false;
-    }
-    if (getAssignment(marker.kind))
-      return failPhase(call, stage);
-    switch (marker.kind) {
-    case MarkerKind::loopMore:
-    case MarkerKind::sync:
-    case MarkerKind::sort:
-      return failPhase(call, stage);
-    default:
-      return true;
-    }
-  }
-
-  /// A directive that is the same for all bins; false after an error.
-  bool readDirective(const llvm::CallInst *call, const Marker &marker,
-                     ScheduleDescription &schedule) {
-    auto constant = [&](unsigned operand) {
-      return llvm::cast<llvm::ConstantInt>(call->getArgOperand(operand))
-          ->getSExtValue();
-    };
-    std::optional<int64_t> number;
-    switch (marker.kind) {
-    case MarkerKind::schedule:
-      schedule.policy = static_cast<SchedulePolicy>(constant(0));
-      schedule.tileSplit = constant(1);
-      if (schedule.tileSplit >= 0)
-        return true;
-      fail(call) << "expected a tile split of at least 0, but got "
-                 << schedule.tileSplit;
-      return false;
-    case MarkerKind::endStage:
-      if (marker.stages.empty()) {
-        fail(call) << "expected endStage of a stage of pipeline '"
-                   << pipeline.name << "'";
-        return false;
-      }
-      for (unsigned other : marker.stages)
-        if (!llvm::is_contained(schedule.endStage, other))
-          schedule.endStage.push_back(other);
-      return true;
-    case MarkerKind::endBin:
-      schedule.endBin = true;
-      return true;
-    case MarkerKind::batch:
-      schedule.batch = constant(0);
-      if (schedule.batch >= 1)
-        return true;
-      fail(call) << "expected a batch of at least 1, but got "
-                 << schedule.batch;
-      return false;
-    case MarkerKind::everyBin:
-      schedule.everyBin = true;
-      return true;
-    case MarkerKind::lanes:
-      schedule.lanes = getConstant(call, 0, "what lanes are given");
-      schedule.lanesLocation = getUserLocation(call, unit, context);
-      if (!schedule.lanes || (*schedule.lanes >= 0 && *schedule.lanes <= 3))
-        return schedule.lanes.has_value();
-      fail(call) << "expected a value of piko::Lanes, but got "
-                 << *schedule.lanes;
-      return false;
-    case MarkerKind::precision:
-      if (!(number = getConstant(call, 0, "a precision")))
-        return false;
-      schedule.precision = *number;
-      if (*number >= 0 && *number <= 2)
-        return true;
-      fail(call) << "expected a value of piko::Precision, but got " << *number;
-      return false;
-    default:
-      if (!(number = getConstant(call, 0, "an order")))
-        return false;
-      schedule.unordered = *number != 0;
-      return true;
-    }
   }
 
   //===--------------------------------------------------------------------===//

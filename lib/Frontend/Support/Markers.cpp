@@ -4,6 +4,7 @@
 #include "Support/Markers.h"
 
 #include "llvm/ADT/STLExtras.h"
+#include "llvm/ADT/StringExtras.h"
 #include "llvm/ADT/StringSwitch.h"
 #include "llvm/IR/InstrTypes.h"
 #include "llvm/IR/Module.h"
@@ -36,11 +37,16 @@ const Assignment *piko::getAssignment(MarkerKind marker) {
 
 const Directive *piko::getDirective(MarkerKind marker) {
   static constexpr Directive directives[] = {
-#define PIKO_DIRECTIVE(NAME, SAID, VARIES, ...)                                \
-  {MarkerKind::NAME, #SAID, Directive::VARIES},
+#define PIKO_DIRECTIVE(NAME, SAID, VARIES, OF, ATTRIBUTE, VALUE, ...)          \
+  {MarkerKind::NAME,  #NAME,      #SAID,           Directive::VARIES,          \
+   Directive::Of##OF, #ATTRIBUTE, Directive::VALUE},
 #include "piko/markers.def"
   };
   return findRow(directives, marker);
+}
+
+std::string Directive::getOperation() const {
+  return "piko.set_" + llvm::convertToSnakeFromCamelCase(name);
 }
 
 namespace {

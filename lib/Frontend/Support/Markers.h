@@ -38,10 +38,16 @@ const Assignment *getAssignment(MarkerKind marker);
 /// What a schedule phase may say.
 struct Directive {
   MarkerKind marker;
-  llvm::StringLiteral said; ///< what a text calls it
+  llvm::StringLiteral name, said; ///< the marker's, and what a text calls it
   /// For what it may be another: for nothing, for each bin, or for each bin in
   /// a stage that takes a list.
   enum Varies { Stage, AnyBin, ListBin } varies;
+  /// What it becomes: an attribute of one of a stage's operations.
+  enum Of { OfStage, OfSchedule, OfProcess } of;
+  llvm::StringLiteral attribute;
+  enum Value { Flag, Count, Lanes, Precision, Policy, Stages } value;
+  /// What it becomes where it varies.
+  std::string getOperation() const;
 };
 /// Null for a marker that is none.
 const Directive *getDirective(MarkerKind marker);

@@ -275,19 +275,14 @@ bool FuseStagesPass::runsBetterAfter(EdgeOp edge) {
 static void runAfter(StageOp stage, StageOp producer) {
   ScheduleOp schedule = stage.getSchedule();
   OpBuilder builder(stage.getProcess());
-  auto unit = builder.getUnitAttr();
   if (!schedule) {
     ScheduleOp before = producer.getSchedule();
-    auto kind = ScheduleKindAttr::get(
-        builder.getContext(),
-        getAskedKind(producer).value_or(ScheduleKind::LoadBalance));
     schedule = ScheduleOp::create(
-        builder, stage.getLoc(), kind, /*tileSplit=*/nullptr,
-        /*endStage=*/nullptr, /*endBin=*/nullptr, /*after=*/nullptr,
-        /*batch=*/nullptr, /*everyBin=*/nullptr, /*unordered=*/nullptr,
-        before ? before.getResolvedAttr() : nullptr, /*lanes=*/nullptr);
+        builder, stage.getLoc(),
+        getAskedKind(producer).value_or(ScheduleKind::LoadBalance));
+    schedule.setResolved(before && before.getResolved());
   }
-  schedule.setAfterAttr(unit);
+  schedule.setAfter(true);
 }
 
 //===----------------------------------------------------------------------===//

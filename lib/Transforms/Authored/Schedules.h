@@ -8,9 +8,13 @@ namespace piko {
 
 /// Whether a schedule says more than which core takes a bin.
 inline bool saysMoreThanCore(ScheduleOp schedule) {
-  return schedule.getEndStageAttr() || schedule.getEndBin() ||
-         schedule.getAfter() || schedule.getBatch() || schedule.getEveryBin() ||
-         schedule.getUnordered() || schedule.getLanes();
+  auto said =
+      llvm::cast<mlir::DictionaryAttr>(schedule->getPropertiesAsAttribute());
+  return llvm::any_of(said, [&](mlir::NamedAttribute directive) {
+    return directive.getName() != schedule.getKindAttrName() &&
+           directive.getName() != schedule.getTileSplitAttrName() &&
+           directive.getName() != schedule.getResolvedAttrName();
+  });
 }
 
 } // namespace piko

@@ -75,11 +75,7 @@ static ScheduleOp getOrCreateSchedule(StageOp stage) {
     return schedule;
   OpBuilder builder(stage.getContext());
   builder.setInsertionPoint(stage.getProcess());
-  OperationState state(stage.getLoc(), ScheduleOp::getOperationName());
-  state.addAttribute("kind", ScheduleKindAttr::get(stage.getContext(),
-                                                   ScheduleKind::LoadBalance));
-  state.addRegion();
-  return cast<ScheduleOp>(builder.create(state));
+  return ScheduleOp::create(builder, stage.getLoc(), ScheduleKind::LoadBalance);
 }
 
 static LogicalResult setSchedule(StageOp stage, const Directive &directive) {

@@ -154,7 +154,6 @@ StageOp GBuffer::createStage() {
     builder.setInsertionPointAfter(stage);
   }
   size_t rank = of.getBins().size();
-  auto yes = builder.getUnitAttr();
   constexpr int64_t threads = 64;
   auto stage = StageOp::create(
       builder, loc,
@@ -162,15 +161,15 @@ StageOp GBuffer::createStage() {
           getUnusedName(pipeline, of.getSymName() + "_pixels")),
       builder.getDenseI64ArrayAttr(SmallVector<int64_t>(rank, getSide(rank))),
       builder.getI64IntegerAttr(threads), of.getInputAttr(),
-      builder.getArrayAttr({}), builder.getI64IntegerAttr(lineage),
-      /*tile=*/nullptr, /*split=*/nullptr, /*ordered=*/yes, /*placed=*/nullptr,
-      /*writes=*/yes, /*takesList=*/yes, /*fused=*/nullptr);
+      builder.getArrayAttr({}));
+  stage.setLineage(lineage);
+  stage.setOrdered(true);
+  stage.setWrites(true);
+  stage.setTakesList(true);
   builder.createBlock(&stage.getBody());
-  ScheduleOp::create(builder, loc, ScheduleKind::LoadBalance,
-                     /*tileSplit=*/nullptr, /*endStage=*/nullptr,
-                     /*endBin=*/false, /*after=*/false, /*batch=*/nullptr,
-                     /*everyBin=*/true, /*unordered=*/false, /*resolved=*/true,
-                     /*lanes=*/nullptr);
+  auto schedule = ScheduleOp::create(builder, loc, ScheduleKind::LoadBalance);
+  schedule.setEveryBin(true);
+  schedule.setResolved(true);
   return stage;
 }
 

@@ -57,30 +57,17 @@ public:
   void scheduleBins(Node &node) {
     node.schedules.assign(node.grid.bins(), {});
     node.collected.assign(node.grid.bins(), {});
-    std::vector<const TypeInfo *> waitsOn;
-    bool endsBin = false, unordered = false;
-    Precision precision = Precision::Strict;
-    auto expectSame = [&](bool isSame, int64_t bin, const char *directive) {
-      if (bin > 0 && !isSame)
-        node.fail(bin, std::string("expected ") + directive +
-                           " to be said for all bins or for none");
-    };
+    StageSchedule before;
     for (int64_t bin = 0; bin < node.grid.bins(); ++bin) {
-      node.waitsOn.clear();
-      node.endsBin = node.unordered = false;
-      node.precision = Precision::Strict;
+      StageSchedule &said = node;
+      said = {};
       CallFrame call{.phase = Phase::Schedule, .node = &node, .bin = bin};
       run(call, [&] { node.schedule(bin); });
-      expectSame(std::is_permutation(node.waitsOn.begin(), node.waitsOn.end(),
-                                     waitsOn.begin(), waitsOn.end()),
-                 bin, "endStage");
-      expectSame(node.endsBin == endsBin, bin, "endBin");
-      expectSame(node.unordered == unordered, bin, "specifyOrder");
-      expectSame(node.precision == precision, bin, "specifyPrecision");
-      waitsOn = node.waitsOn;
-      endsBin = node.endsBin;
-      unordered = node.unordered;
-      precision = node.precision;
+      const char *other = bin > 0 ? said.findOther(before) : nullptr;
+      if (other)
+        node.fail(bin, std::string("expected ") + other +
+                           " to be said for all bins or for none");
+      before = said;
     }
   }
 

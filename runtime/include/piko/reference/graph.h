@@ -37,8 +37,27 @@ struct BinSchedule {
   bool everyBin = false;
 };
 
+/// What schedule() says for all bins or for none.
+struct StageSchedule {
+  std::vector<const TypeInfo *> waitsOn; ///< endStage
+  bool endsBin = false;                  ///< endBin
+  bool unordered = false;
+  Precision precision = Precision::Strict; ///< of compiled code only
+
+  /// The directive that another one says differently, or null.
+  const char *findOther(const StageSchedule &other) const {
+    return !std::is_permutation(waitsOn.begin(), waitsOn.end(),
+                                other.waitsOn.begin(), other.waitsOn.end())
+               ? "endStage"
+           : endsBin != other.endsBin     ? "endBin"
+           : unordered != other.unordered ? "specifyOrder"
+           : precision != other.precision ? "specifyPrecision"
+                                          : nullptr;
+  }
+};
+
 /// A stage of a pipeline. Derived classes call the user's three phases.
-class Node {
+class Node : public StageSchedule {
 public:
   virtual ~Node() = default;
   virtual void assign(const std::byte *primitive) = 0;
@@ -68,11 +87,7 @@ public:
 
   // Set anew for each run.
   BinGrid grid;
-  std::vector<BinSchedule> schedules;    ///< one for each bin
-  std::vector<const TypeInfo *> waitsOn; ///< endStage
-  bool endsBin = false;                  ///< endBin
-  bool unordered = false;
-  Precision precision = Precision::Strict; ///< of compiled code only
+  std::vector<BinSchedule> schedules; ///< one for each bin
   bool collects() const { return takesList || endsBin || !waitsOn.empty(); }
   mutable StackPool stacks; ///< of iterations that meet in a call of Process
   int loop = -1; ///< which cycle of stages that do not collect, or -1

@@ -65,6 +65,18 @@ def Piko_StageOp : Piko_Op<"stage", [
     `:` (`list` $takesList^)? $input `->` $outputs attr-dict-with-keyword
     custom<IsolatedBody>($body)
   }];
+  // The stage as a text says it: without what passes find.
+  let builders = [OpBuilder<(ins "::mlir::StringAttr":$name,
+      "::mlir::DenseI64ArrayAttr":$bins, "::mlir::IntegerAttr":$threads,
+      "::mlir::FlatSymbolRefAttr":$input, "::mlir::ArrayAttr":$outputs), [{
+    Properties &said = $_state.getOrAddProperties<Properties>();
+    said.sym_name = name;
+    said.bins = bins;
+    said.threads = threads;
+    said.input = input;
+    said.outputs = outputs;
+    $_state.addRegion();
+  }]>];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
     /// The phases, or null where the stage does not hold them.
@@ -230,6 +242,14 @@ def Piko_ScheduleOp : Piko_Op<"schedule", [
     $everyBin^)? (`unordered` $unordered^)? (`resolved` $resolved^)? (`lanes`
     $lanes^)? attr-dict-with-keyword (`dynamic` custom<IsolatedBody>($body)^)?
   }];
+  // Of the directives, those that are said; see piko/markers.def.
+  let builders = [OpBuilder<(ins "ScheduleKind":$kind,
+      CArg<"::llvm::ArrayRef<::mlir::NamedAttribute>", "{}">:$directives), [{
+    $_state.addAttribute(getKindAttrName($_state.name),
+                         ScheduleKindAttr::get($_builder.getContext(), kind));
+    $_state.addAttributes(directives);
+    $_state.addRegion();
+  }]>];
   let hasRegionVerifier = 1;
 }
 
