@@ -269,8 +269,11 @@ void Report::writeWaits(StageOp stage) {
 }
 
 void Report::writeStage(StageOp stage) {
-  out << "  " << stage.getSymName() << ": " << describeBins(stage) << ", "
-      << stage.getThreads() << " threads, " << describeSchedule(stage);
+  out << "  " << stage.getSymName();
+  if (auto label = stage.getLabel())
+    out << " ('" << *label << "')";
+  out << ": " << describeBins(stage) << ", " << stage.getThreads()
+      << " threads, " << describeSchedule(stage);
   if (ScheduleOp schedule = stage.getSchedule();
       schedule && schedule.getUnordered())
     out << ", unordered";

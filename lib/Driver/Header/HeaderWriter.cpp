@@ -58,6 +58,12 @@ struct Input {
   int64_t number; ///< Of its source; -1 if it has several.
 };
 
+/// What the pipeline's class calls a stage, whatever messages call it.
+static StringRef getMemberName(StageOp stage) {
+  auto name = stage->getAttrOfType<mlir::StringAttr>(cppNameAttr);
+  return name ? name.getValue() : stage.getSymName();
+}
+
 class HeaderWriter {
 public:
   HeaderWriter(PipelineOp pipeline, StringRef file, StringRef nameSpace)
@@ -115,7 +121,7 @@ private:
       auto stage = lookupInPipeline<StageOp>(source, source.getStageAttr());
       auto [it, isNew] = byStage.try_emplace(stage);
       if (isNew)
-        it->second = {scope.declare(makeIdentifier(getCppName(stage))),
+        it->second = {scope.declare(makeIdentifier(getMemberName(stage))),
                       lookupRecord(stage, stage.getInputAttr()), number};
       else
         it->second.number = -1;

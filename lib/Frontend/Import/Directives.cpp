@@ -7,7 +7,9 @@
 #include "Support/Accessors.h"
 #include "Support/CallChain.h"
 #include "mlir/IR/Builders.h"
+#include "piko/label.h"
 #include "llvm/ADT/SetVector.h"
+#include "llvm/Analysis/ValueTracking.h"
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/InstIterator.h"
 #include "llvm/IR/Instructions.h"
@@ -53,6 +55,7 @@ private:
                                        llvm::StringRef type, int64_t most);
   bool readPolicy(const Said &said);
   bool readStages(const Said &said);
+  bool readLabel(const Said &said);
 
   StageDescription &stage;
   ScheduleDescription &schedule;
@@ -160,6 +163,8 @@ bool DirectiveReader::read(const Said &said) {
     return readPolicy(said);
   case Directive::Stages:
     return readStages(said);
+  case Directive::Label:
+    return readLabel(said);
   }
   llvm_unreachable("all kinds of values are listed");
 }
@@ -231,6 +236,37 @@ bool DirectiveReader::readStages(const Said &said) {
     stages.insert(mlir::FlatSymbolRefAttr::get(
         &context, unit.pipeline.stages[other].symbol));
   set(said, builder.getArrayAttr(stages.getArrayRef()));
+  return true;
+}
+
+bool DirectiveReader::readLabel(const Said &said) {
+  llvm::StringRef attribute = said.directive->attribute, text;
+  if (!llvm::getConstantStringInfo(said.call->getArgOperand(0), text)) {
+    fail(said.call) << "expected a name to be a constant";
+    return false;
+  }
+  if (!piko::detail::isLabel(text.str().c_str())) {
+    fail(said.call) << piko::detail::labelRule << text << "'";
+    return false;
+  }
+  mlir::Attribute label = builder.getStringAttr(text);
+  if (mlir::Attribute before = schedule.ofStage.get(attribute);
+      before && before != label) {
+    fail(said.call) << "expected one name of stage '" << stage.name
+                    << "', but got " << before << " and " << label;
+    return false;
+  }
+  for (const StageDescription &other : unit.pipeline.stages) {
+    if (&other == &stage ||
+        (other.schedule.ofStage.get(attribute) != label && other.name != text))
+      continue;
+    mlir::InFlightDiagnostic error = fail(said.call);
+    error << "expected a name that no other stage has, but got " << label;
+    error.attachNote(other.location)
+        << "stage '" << other.name << "' is declared here";
+    return false;
+  }
+  set(said, label);
   return true;
 }
 

@@ -45,7 +45,7 @@ struct Directive {
   /// What it becomes: an attribute of one of a stage's operations.
   enum Of { OfStage, OfSchedule, OfProcess } of;
   llvm::StringLiteral attribute;
-  enum Value { Flag, Count, Lanes, Precision, Policy, Stages } value;
+  enum Value { Flag, Count, Lanes, Precision, Policy, Stages, Label } value;
   /// What it becomes where it varies.
   std::string getOperation() const;
 };

@@ -48,7 +48,9 @@ static std::optional<Directive> parseDirective(StringRef text) {
 static StageOp findStage(PipelineOp pipeline, StringRef name) {
   std::string names;
   for (auto stage : pipeline.getOps<StageOp>()) {
-    if (getCppName(stage) == name || stage.getSymName() == name)
+    auto member = stage->getAttrOfType<StringAttr>(cppNameAttr);
+    if ((member && member == name) || getCppName(stage) == name ||
+        stage.getSymName() == name)
       return stage;
     names += (names.empty() ? "'" : ", '") + getCppName(stage).str() + "'";
   }

@@ -162,6 +162,8 @@ StageOp GBuffer::createStage() {
       builder.getDenseI64ArrayAttr(SmallVector<int64_t>(rank, getSide(rank))),
       builder.getI64IntegerAttr(threads), of.getInputAttr(),
       builder.getArrayAttr({}));
+  if (auto label = of.getLabel())
+    stage.setLabel((*label + "_pixels").str());
   stage.setLineage(lineage);
   stage.setOrdered(true);
   stage.setWrites(true);

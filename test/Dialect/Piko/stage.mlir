@@ -33,8 +33,9 @@ piko.pipeline @Phases rank 2 {
   piko.stage @waits bins [0, 0] threads 1 lineage 4 tile 32 split placed : @F -> [] {
     piko.schedule load_balance end_stage [@all, @maps]
   }
-  // CHECK: piko.schedule direct_map end_bin
-  piko.stage @maps bins [0, 0] threads 1 : @F -> [] {
+  // CHECK: piko.stage @maps label "Maps (1)" bins
+  // CHECK-NEXT: piko.schedule direct_map end_bin
+  piko.stage @maps label "Maps (1)" bins [0, 0] threads 1 : @F -> [] {
     piko.schedule direct_map end_bin
   }
   // CHECK: piko.schedule serialize unordered

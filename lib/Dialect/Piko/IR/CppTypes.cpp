@@ -15,6 +15,8 @@ using namespace piko;
 //===----------------------------------------------------------------------===//
 
 StringRef piko::getCppName(Operation *op) {
+  if (auto stage = dyn_cast<StageOp>(op); stage && stage.getLabel())
+    return *stage.getLabel();
   if (auto name = op->getAttrOfType<StringAttr>(cppNameAttr))
     return name.getValue();
   if (isa<SymbolOpInterface>(op))

@@ -39,6 +39,10 @@ bool StageOp::collects() {
 }
 
 LogicalResult StageOp::verifySymbolUses(SymbolTableCollection &) {
+  for (auto other : getPipeline(*this).getOps<StageOp>())
+    if (getLabel() && other != *this && getCppName(other) == *getLabel())
+      return emitOpError("expected a label that no other stage has, but got '")
+             << *getLabel() << "'";
   SmallVector<FlatSymbolRefAttr> records{getInputAttr()};
   llvm::append_range(records, getOutputs().getAsRange<FlatSymbolRefAttr>());
   for (FlatSymbolRefAttr record : records)

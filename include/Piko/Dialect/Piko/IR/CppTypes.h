@@ -21,7 +21,8 @@ constexpr llvm::StringLiteral cppTypesAttr = "piko.cpp_types";
 /// piko.fail_barrier, the call that was not made.
 constexpr llvm::StringLiteral cppNameAttr = "piko.cpp_name";
 
-/// That name; else an operation's symbol, or what its own name says, as "sync".
+/// What messages, reports and the runtime call an operation: a stage's label,
+/// or that name; else its symbol, or what its own name says, as "sync".
 llvm::StringRef getCppName(mlir::Operation *op);
 
 /// An entry of piko.cpp_types.

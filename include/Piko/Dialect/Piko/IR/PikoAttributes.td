@@ -33,6 +33,15 @@ def Piko_FieldAttr : AttrDef<Piko_Dialect, "Field"> {
 
 def Piko_FieldArrayAttr : TypedArrayAttrBase<Piko_FieldAttr, "array of fields">;
 
+/// What reports, traces and names of versions can hold as it is.
+def Piko_LabelAttr : ConfinedAttr<StrAttr, [AttrConstraint<CPred<[{
+    [](::llvm::StringRef text) {
+      return !text.empty() && ::llvm::all_of(text, [](char c) {
+        return ::llvm::isAlnum(c) || ::llvm::StringRef(" _-.()").contains(c);
+      });
+    }(::llvm::cast<::mlir::StringAttr>($_self).getValue())}]>,
+    "of letters, digits, spaces and _-.()">]>;
+
 def Piko_ScheduleKind : I32EnumAttr<"ScheduleKind", "where bins run", [
   I32EnumAttrCase<"LoadBalance", 0, "load_balance">,
   I32EnumAttrCase<"DirectMap", 1, "direct_map">,

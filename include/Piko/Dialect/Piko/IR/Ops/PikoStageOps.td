@@ -20,6 +20,9 @@ def Piko_StageOp : Piko_Op<"stage", [
     primitive is in bin 0, which is legal only where one bin is the whole
     domain. Without a schedule phase the stage is load-balanced.
 
+    `label` is what reports and traces call the stage, and no other stage; without
+    one that is the stage's name in C++.
+
     `lineage` is the stage's place in the order that lineage roots are numbered
     in, and is set by `piko-order-stages`, which moves stages. `tile` is the side
     of the tiles that a bin is divided into where `piko.owner` tells whose they
@@ -55,10 +58,12 @@ def Piko_StageOp : Piko_Op<"stage", [
                        OptionalAttr<Piko_I64Attr>:$tile,
                        UnitAttr:$split, UnitAttr:$ordered, UnitAttr:$placed,
                        UnitAttr:$writes, UnitAttr:$takesList,
-                       OptionalAttr<StrArrayAttr>:$fused);
+                       OptionalAttr<StrArrayAttr>:$fused,
+                       OptionalAttr<Piko_LabelAttr>:$label);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    $sym_name `bins` $bins `threads` $threads (`lineage` $lineage^)?
+    $sym_name (`label` $label^)? `bins` $bins `threads` $threads
+    (`lineage` $lineage^)?
     (`tile` $tile^)? (`split` $split^)?
     (`ordered` $ordered^)? (`placed` $placed^)? (`writes` $writes^)?
     (`fused` $fused^)?
