@@ -316,7 +316,7 @@ TEST(Errors, AllocateForAMissingSource) {
 
 // What stages wait for, and whether they keep the order, is the same in all
 // bins.
-enum class Varying { EndStage, EndBin, Order, Precision, Nothing };
+enum class Varying { EndStage, EndBin, Order, Precision, Name, Nothing };
 Varying varying;
 struct Varied : piko::Stage<1, 1, 1, int> {
   void assignBin(const int &i) { assignToAll(i); }
@@ -330,6 +330,8 @@ struct Varied : piko::Stage<1, 1, 1, int> {
       specifyOrder(piko::Unordered);
     if (varying == Varying::Precision && bin.index != 2)
       specifyPrecision(piko::Precision::Relaxed);
+    if (varying == Varying::Name && bin.index != 3)
+      specifyName("Varied one");
   }
   void process(const int &) {}
 };
@@ -360,8 +362,51 @@ TEST(Errors, SchedulesThatDependOnTheBin) {
   EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
               HasSubstr("bin 2: expected specifyPrecision to be said for all "
                         "bins or for none"));
+  varying = Varying::Name;
+  EXPECT_THAT(messageOf([&] { run(pipe, {}); }),
+              HasSubstr("bin 3: expected specifyName to be said for all bins "
+                        "or for none"));
   varying = Varying::Nothing;
   EXPECT_EQ(messageOf([&] { run(pipe, {}); }), "(no error)");
+}
+
+// Messages call a stage what it is named, which no other one is.
+struct Named : Whole<int, int> {
+  std::vector<const char *> names;
+  void schedule(piko::BinId) {
+    for (const char *name : names)
+      specifyName(name);
+  }
+  void process(const int &i) { emit(i, i); }
+};
+
+TEST(Errors, Names) {
+  struct NamedPipe : piko::Pipe<> {
+    Named first, second;
+    Sink sink;
+    NamedPipe() {
+      source(first);
+      connect(first, 0, second);
+      connect(second, 0, sink);
+      setDomain({1, 1});
+    }
+  } pipe;
+  auto message = [&](std::vector<const char *> names) {
+    pipe.first.names = std::move(names);
+    return messageOf([&] { run(pipe, {1}); });
+  };
+  EXPECT_THAT(message({"First pass"}),
+              HasSubstr("stage 'First pass', bin 0: expected one of the 1 "
+                        "ports, but got port 1"));
+  EXPECT_THAT(message({""}),
+              HasSubstr("expected a name of letters, digits, spaces and _-.(), "
+                        "but got ''"));
+  EXPECT_THAT(message({"a=b"}), HasSubstr("but got 'a=b'"));
+  EXPECT_THAT(message({"a", "a", "b"}),
+              HasSubstr("expected one name of a stage, but got 'a' and 'b'"));
+  pipe.second.names = {"a"};
+  EXPECT_THAT(message({"a"}),
+              HasSubstr("stage 'a': expected a name that no other stage has"));
 }
 
 struct Pixels {

@@ -230,6 +230,11 @@ public:
                         detail::Place at = detail::Place::current()) {
     PIKO_SAY(precision, static_cast<int32_t>(precision));
   }
+  /// What reports, traces and messages call the stage, and no other one.
+  void specifyName(const char *name,
+                   detail::Place at = detail::Place::current()) {
+    PIKO_SAY(name, name);
+  }
 
   // Process.
 

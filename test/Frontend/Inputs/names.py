@@ -17,7 +17,7 @@ STAGE = """
     assignBin assignToAll assignToBin assignToBoundingBox assignToLine
     assignToPreviousBins
     schedule specifySchedule endStage endBin batch everyBin specifyOrder
-    specifyLanes specifyPrecision process emit update parallelFor parallelForPixels sync any all count reduce
+    specifyLanes specifyPrecision specifyName process emit update parallelFor parallelForPixels sync any all count reduce
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage
     Uses"""
 PIPE = """

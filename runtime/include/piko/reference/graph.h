@@ -43,6 +43,7 @@ struct StageSchedule {
   bool endsBin = false;                  ///< endBin
   bool unordered = false;
   Precision precision = Precision::Strict; ///< of compiled code only
+  std::string label;                       ///< specifyName
 
   /// The directive that another one says differently, or null.
   const char *findOther(const StageSchedule &other) const {
@@ -52,6 +53,7 @@ struct StageSchedule {
            : endsBin != other.endsBin     ? "endBin"
            : unordered != other.unordered ? "specifyOrder"
            : precision != other.precision ? "specifyPrecision"
+           : label != other.label         ? "specifyName"
                                           : nullptr;
   }
 };
@@ -73,7 +75,9 @@ public:
     fail(bin, "expected one of the " + std::to_string(ports.size()) +
                   " ports, but got port " + std::to_string(port));
   }
-  std::string_view name() const { return type->name; }
+  std::string_view name() const {
+    return label.empty() ? type->name : std::string_view(label);
+  }
 
   const void *address = nullptr;  ///< of the user's stage
   size_t size = 0;                ///< its bytes

@@ -359,6 +359,10 @@ inline std::vector<Component> Pipeline::prepareStages() {
     declared.push_back(node.get());
   }
   for (const Node *node : declared)
+    for (const Node *other : declared)
+      if (node != other && !node->label.empty() && node->label == other->label)
+        node->fail(-1, "expected a name that no other stage has");
+  for (const Node *node : declared)
     for (const TypeInfo *type : node->waitsOn)
       if (std::ranges::none_of(
               declared, [&](const Node *other) { return other->type == type; }))

@@ -9,6 +9,7 @@
 
 #include <piko/macros_begin.h>
 
+#include <piko/label.h>
 #include <piko/reference/calls.h>
 
 #define PIKO_PORT_TYPES(T, Out) "emit of a type that no port has"
@@ -69,6 +70,17 @@ struct Directives {
   void precision(int32_t precision) {
     frameInSchedule("specifyPrecision", at).node->precision =
         static_cast<Precision>(precision);
+  }
+
+  void name(const char *text) {
+    CallFrame &call = frameInSchedule("specifyName", at);
+    std::string &label = call.node->label;
+    if (!detail::isLabel(text))
+      call.node->fail(call.bin, detail::labelRule + std::string(text) + "'");
+    if (!label.empty() && label != text)
+      call.node->fail(call.bin, "expected one name of a stage, but got '" +
+                                    label + "' and '" + text + "'");
+    label = text;
   }
 
   SourcePlace at;
