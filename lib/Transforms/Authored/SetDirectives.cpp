@@ -139,17 +139,21 @@ static LogicalResult setPrecision(StageOp stage, const Directive &directive) {
 }
 
 static LogicalResult set(StageOp stage, const Directive &directive) {
-  if (directive.key == "schedule")
-    return setSchedule(stage, directive);
-  if (directive.key == "split")
-    return setSplit(stage, directive);
-  if (directive.key == "lanes")
-    return setLanes(stage, directive);
-  if (directive.key == "precision")
-    return setPrecision(stage, directive);
+  using Set = LogicalResult (*)(StageOp, const Directive &);
+  static constexpr std::pair<StringLiteral, Set> keys[] = {
+      {"schedule", setSchedule},
+      {"split", setSplit},
+      {"lanes", setLanes},
+      {"precision", setPrecision}};
+  std::string expected;
+  for (const auto &[key, set] : keys) {
+    if (directive.key == key)
+      return set(stage, directive);
+    bool isLast = key == std::end(keys)[-1].first;
+    expected += (expected.empty() ? "" : isLast ? " or " : ", ") + key.str();
+  }
   return refuse(stage, directive)
-         << "expected schedule, split, lanes or precision, because others may "
-            "change results";
+         << "expected " << expected << ", because others may change results";
 }
 
 LogicalResult SetDirectivesPass::apply(StringRef text,
