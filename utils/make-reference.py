@@ -56,9 +56,20 @@ LEVELS = [
     ("Loops for processors", "loops over what is stored",
      "Transforms/CPUPasses.td"),
     ("Vectors", "loops as lanes", "Transforms/VectorPasses.td"),
-    ("Conversions", "to upstream dialects, grids and LLVM",
-     "Conversion/Passes.td"),
+    ("GPUs", "grids of blocks and threads", "Conversion/GPUPasses.td"),
+    ("Conversions", "to upstream dialects and LLVM",
+     "Conversion/TargetPasses.td"),
 ]
+
+# Functions of lib/Driver/Sequences, by the sequence that they add.
+SEQUENCES = {
+    "addSynthesisSequence": "piko-synthesize",
+    "addMachineSequence": "piko-to-machine",
+    "addCPUSequence": "piko-to-cpu",
+    "addGPUSequence": "piko-to-gpu",
+    "addLLVMSequence": "piko-cpu-to-llvm",
+    "addNVVMSequence": "piko-gpu-to-nvvm",
+}
 
 
 def anchor(heading):
@@ -66,9 +77,68 @@ def anchor(heading):
     return "".join(kept).replace(" ", "-")
 
 
+def sources():
+    """The file of each pass, by the name of its definition in TableGen."""
+    files = {}
+    for file in sorted((ROOT / "lib").rglob("*.cpp")):
+        for name in re.findall(r"#define GEN_PASS_DEF_(\w+)", file.read_text()):
+            files[name] = file.relative_to(ROOT)
+    return files
+
+
+def arguments():
+    """The argument of each pass, by the name of its definition."""
+    definition = re.compile(r'^def (\w+)\s*:\s*Pass<"([\w-]+)"', re.M)
+    return {
+        name: argument
+        for _, _, file in LEVELS
+        for name, argument in definition.findall(
+            (ROOT / "include/Piko" / file).read_text())
+    }
+
+
+def sequences():
+    """Which passes of ours a sequence runs, in order."""
+    code = "\n".join(
+        (ROOT / "lib/Driver/Sequences" / file).read_text()
+        for file in ("Sequences.cpp", "GPUSequences.cpp"))
+    bodies = {}
+    for function, body in re.findall(
+            r"^(?:static )?void (?:piko::)?(add\w+)\([^{;]*\{\n(.*?)^\}",
+            code, re.M | re.S):
+        bodies[function] = bodies.get(function, "") + body
+    names = arguments()
+    guarded = re.compile(
+        r"^  if \([^{;]*\bhas\([^{;]*\)(?: \{\n.*?^  \}|\n[^;]*;)\n",
+        re.M | re.S)
+
+    def expand(function, leaves_out=False):
+        body = bodies[function]
+        if leaves_out:
+            body = guarded.sub("", body)
+        for made, called, values in re.findall(
+                r"\bcreate(\w+)\(|\b(add(?!Pass\b)\w+)\(([^;]*)\);", body):
+            if made in names:
+                yield names[made]
+            elif called in bodies and called != function:
+                yield from expand(called, leaves_out or "none()" in values)
+
+    for function, name in SEQUENCES.items():
+        yield name, list(dict.fromkeys(expand(function)))
+
+
 def passes():
-    """A chapter for each level, and an index of them."""
+    """The sequences, a chapter for each level, and an index of them."""
     index, chapters = [], []
+    files, names = sources(), arguments()
+    places = {argument: files[name.upper()] for name, argument in names.items()
+              if name.upper() in files}
+    index.append("Passes of ours, in the order in which the sequences run them; "
+                 "some may be left out, or are for some texts alone:\n")
+    for name, run in sequences():
+        steps = ", ".join(f"[{step}](#-{step})" for step in run)
+        index.append(f"* `--{name}`: {steps}")
+    index.append("")
     for level, what, file in LEVELS:
         text = tblgen("-gen-pass-doc", file)
         entries = re.findall(r"^### `-([\w-]+)`\n+_(.*?)_$", text, re.M | re.S)
@@ -76,6 +146,10 @@ def passes():
         index += [f"- [`{name}`](#-{name}): {' '.join(summary.split())}"
                   for name, summary in entries]
         index.append("")
+        text = re.sub(
+            r"^(### `-([\w-]+)`\n+_.*?_)$",
+            lambda entry: f"{entry[1]}\n\nIn `{places[entry[2]]}`.",
+            text, flags=re.M | re.S)
         chapters.append(f"## {level}\n\n{text}")
     return "\n".join(index + chapters)
 

@@ -15,7 +15,7 @@ namespace piko {
 // CPUs
 //===----------------------------------------------------------------------===//
 
-/// Of a cache, in bytes.
+/// Of a cache line, in bytes.
 constexpr int64_t lineSize = 64;
 
 /// What a core has of a cache of the second level, and of the third one, in

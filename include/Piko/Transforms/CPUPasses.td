@@ -220,9 +220,9 @@ def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
     **Requires** loops over units (`convert-piko-to-scf`).
 
     **Does**: short-circuit evaluation and jump threading, which undo what earlier
-    passes put before conditions to see through them. Of a conjunction, the right half,
-    or else the left one, moves under the other if it takes work (`min-weight`), with
-    what else serves only the sides. A condition that is known, and does nothing, on one
+    passes put before conditions to see through them. Of a conjunction, the half that
+    takes work (`min-weight`), the right one first, moves under the other half, and
+    with it what only the sides use. A condition that is known, and does nothing, on one
     side of an earlier one moves into the other side. So lanes of which none passes the
     first test do nothing else. A test whether any bit of a float is set goes where a
     condition around it has found that the float is not 0.

@@ -36,7 +36,7 @@ static bool runInLockstep(ParallelForOp parallel) {
   scf::ForOp loop =
       convertLoop(cast<ParallelLoopOpInterface>(*hoistInvariants(copy)));
   LaneCandidate candidate(loop);
-  countLoops(loop);
+  upliftWhiles(loop);
   readAllElements(loop);
   copyItemArrays(loop);
   int64_t laneCount = std::max<int64_t>(llvm::PowerOf2Ceil(*count), 4);

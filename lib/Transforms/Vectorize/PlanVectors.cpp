@@ -261,10 +261,10 @@ static scf::ForOp copyAsCount(Operation *op) {
                                      : scf::ForOp();
   auto loop = dyn_cast<scf::WhileOp>(op);
   if (!loop || loop.getInits().size() != 1 || !loop->use_empty() ||
-      !findCountedWhile(loop))
+      !findUpliftableWhile(loop))
     return {};
   auto copy = cast<scf::WhileOp>(builder.clone(*loop));
-  return countLoop(copy, *findCountedWhile(copy));
+  return upliftWhile(copy, *findUpliftableWhile(copy));
 }
 
 static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
@@ -306,7 +306,7 @@ bool PlanVectorsPass::planInOrder(Operation *op) {
   scf::ForOp copy = copyAsCount(op);
   if (!copy)
     return false;
-  countLoops(copy);
+  upliftWhiles(copy);
   if (!mayRunInOrder(copy, laneCount)) {
     copy.erase();
     return false;
@@ -339,7 +339,7 @@ WalkResult PlanVectorsPass::visit(Operation *op) {
     return WalkResult::advance();
   // Of a copy: what stays scalar stays as it is.
   auto copy = cast<scf::ForOp>(OpBuilder(loop).clone(*loop));
-  countLoops(copy);
+  upliftWhiles(copy);
   readAllElements(copy);
   copyItemArrays(copy);
   IterationLanes lanes(copy, laneCount);

@@ -8,7 +8,7 @@
 using namespace mlir;
 using namespace piko;
 
-std::optional<CountedLoop> piko::findCountedWhile(scf::WhileOp loop) {
+std::optional<CountedLoop> piko::findUpliftableWhile(scf::WhileOp loop) {
   std::optional<CountedLoop> counted = findCountedLoop(loop);
   const CountedLoop::Bound *bound = counted ? counted->getBound() : nullptr;
   if (!bound || !counted->isByOne() || !counted->onlyCompares())
@@ -33,7 +33,7 @@ std::optional<CountedLoop> piko::findCountedWhile(scf::WhileOp loop) {
   return counts ? counted : std::nullopt;
 }
 
-scf::ForOp piko::countLoop(scf::WhileOp loop, const CountedLoop &counted) {
+scf::ForOp piko::upliftWhile(scf::WhileOp loop, const CountedLoop &counted) {
   const CountedLoop::Bound &bound = counted.bounds.front();
   unsigned variable = counted.number;
   IRRewriter builder(loop->getContext());
@@ -72,10 +72,10 @@ scf::ForOp piko::countLoop(scf::WhileOp loop, const CountedLoop &counted) {
   return made;
 }
 
-void piko::countLoops(scf::ForOp root) {
+void piko::upliftWhiles(scf::ForOp root) {
   SmallVector<scf::WhileOp> loops;
   root.walk([&](scf::WhileOp loop) { loops.push_back(loop); });
   for (scf::WhileOp loop : loops)
-    if (std::optional<CountedLoop> counted = findCountedWhile(loop))
-      countLoop(loop, *counted);
+    if (std::optional<CountedLoop> counted = findUpliftableWhile(loop))
+      upliftWhile(loop, *counted);
 }

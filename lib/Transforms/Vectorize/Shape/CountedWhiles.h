@@ -11,13 +11,14 @@ namespace piko {
 
 /// A loop that an scf.for can count in 64 bits: by one, up to a number or below
 /// it.
-std::optional<CountedLoop> findCountedWhile(mlir::scf::WhileOp loop);
+std::optional<CountedLoop> findUpliftableWhile(mlir::scf::WhileOp loop);
 
-mlir::scf::ForOp countLoop(mlir::scf::WhileOp loop, const CountedLoop &counted);
+mlir::scf::ForOp upliftWhile(mlir::scf::WhileOp loop,
+                             const CountedLoop &counted);
 
 /// Makes loops that count of those inside of which one knows how often they
 /// iterate, in 64 bits.
-void countLoops(mlir::scf::ForOp root);
+void upliftWhiles(mlir::scf::ForOp root);
 
 } // namespace piko
 
