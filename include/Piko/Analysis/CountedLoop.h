@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops that count: the one place that knows them.
+// Loops that count, as all passes find them. One that rewrites each loop it
+// can, and asks for no more, has upstream's scf::upliftWhileToForLoop
+// (MapThreads.cpp).
 
 #ifndef PIKO_ANALYSIS_COUNTEDLOOP_H
 #define PIKO_ANALYSIS_COUNTEDLOOP_H

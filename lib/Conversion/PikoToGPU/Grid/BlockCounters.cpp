@@ -4,8 +4,7 @@
 // over the buckets of one. Each would take two registers of every thread for as
 // long as the loop runs, and with it what follows from it: addresses, the end
 // of the loop. So
-//   1. the counter is in shared memory, and one thread counts it on
-//   between
+//   1. the counter is in shared memory, and one thread counts it on between
 //      two barriers;
 //   2. each use loads it again, which LLVM may not do before a loop.
 // So is what a loop over groups of primitives needs of the bucket: each thread

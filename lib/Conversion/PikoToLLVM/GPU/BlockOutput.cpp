@@ -6,8 +6,7 @@
 //      the order is that of threads;
 //   3. one thread takes room for the directory, in which each says what it has;
 //   4. records of a local edge are copied after those that the block has;
-//   where
-//      they come to follows from a sum of their numbers.
+//      where they come to follows from a sum of their numbers.
 
 #include "PikoToLLVM/GPU/GridCode.h"
 #include "PikoToLLVM/GPU/GridLog.h"
