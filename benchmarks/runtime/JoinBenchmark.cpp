@@ -10,7 +10,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "pikort/abi.h"
+#include "pikort/emission.h"
 
 #include <algorithm>
 #include <chrono>

@@ -11,6 +11,7 @@
 #include "Piko/Target/Emulate.h"
 #include "Piko/Target/KernelImages.h"
 #include "Piko/Target/PTX.h"
+#include "Piko/Target/RuntimeCode.h"
 
 #include "mlir/Dialect/GPU/IR/GPUDialect.h"
 #include "mlir/Dialect/LLVMIR/LLVMDialect.h"
@@ -371,13 +372,27 @@ LogicalResult piko::lowerToGPU(ModuleOp module, const CheckOptions &check,
   return emitError(loc) << "expected a kernel, but the pipeline has none";
 }
 
+std::unique_ptr<llvm::Module>
+piko::translate(Operation *op, llvm::LLVMContext &context, StringRef name) {
+  std::unique_ptr<llvm::Module> module =
+      translateModuleToLLVMIR(op, context, name);
+  if (!module)
+    return nullptr;
+  auto kind = isa<gpu::GPUModuleOp>(op) ? RuntimeCode::GPU : RuntimeCode::CPU;
+  if (llvm::Error error = inlineRuntimeCode(*module, kind)) {
+    emitError(op->getLoc()) << llvm::toString(std::move(error));
+    return nullptr;
+  }
+  return module;
+}
+
 /// Loads and stores are aligned as the layout says that is known by then, and
 /// by LLVM's own one numbers of 64 bits are not.
 static std::unique_ptr<llvm::Module>
 translateForPTX(gpu::GPUModuleOp kernels, llvm::LLVMContext &context) {
   kernels->setAttr(LLVM::LLVMDialect::getDataLayoutAttrName(),
                    StringAttr::get(kernels.getContext(), getPTXLayout()));
-  return translateModuleToLLVMIR(kernels, context, kernels.getName());
+  return translate(kernels, context, kernels.getName());
 }
 
 std::unique_ptr<llvm::Module>
@@ -394,13 +409,12 @@ piko::translateKernels(ModuleOp module, llvm::LLVMContext &context) {
 std::unique_ptr<llvm::Module>
 piko::translateToLLVMIR(ModuleOp module, llvm::LLVMContext &context,
                         const GPUOptions &gpu, int optLevel) {
-  std::unique_ptr<llvm::Module> host =
-      translateModuleToLLVMIR(module, context, "pipeline");
+  std::unique_ptr<llvm::Module> host = translate(module, context, "pipeline");
   for (auto kernels : module.getOps<gpu::GPUModuleOp>()) {
     bool isPTX = gpu.target == GPUTarget::CUDA;
     std::unique_ptr<llvm::Module> translated =
         isPTX ? translateForPTX(kernels, context)
-              : translateModuleToLLVMIR(kernels, context, kernels.getName());
+              : translate(kernels, context, kernels.getName());
     if (!host || !translated)
       return nullptr;
     StringRef name = kernels.getName();

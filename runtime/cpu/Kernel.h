@@ -142,6 +142,8 @@ struct Keys {
   Array<uint64_t> words;
 
   uint64_t word(int64_t item, int32_t w) const {
+    if (w >= width)
+      return 0;
     return words ? words[item * width + w] : base + static_cast<uint64_t>(item);
   }
 };

@@ -98,7 +98,7 @@ struct Queue {
       uint64_t *to = words.extend(memory, stream.count * keyWidth);
       for (int64_t i = 0; i < stream.count; ++i)
         for (int32_t w = 0; w < keyWidth; ++w)
-          *to++ = w < stream.keys.width ? stream.keys.word(i, w) : 0;
+          *to++ = stream.keys.word(i, w);
     }
   }
 

@@ -9,7 +9,7 @@
 //
 //===----------------------------------------------------------------------===//
 
-#include "pikort/abi.h"
+#include "pikort/emission.h"
 #include "pikort/pikort.hpp"
 
 #include <gtest/gtest.h>

@@ -2,7 +2,7 @@
 //===- WriterTest.cpp - Reordered emissions, scratch, schedules
 //------------===//
 
-#include "pikort/abi.h"
+#include "pikort/emission.h"
 #include "pikort/pikort.hpp"
 
 #include <cstring>

@@ -10,7 +10,6 @@
 #include "Piko/Target/Graphviz.h"
 
 #include "mlir/IR/BuiltinOps.h"
-#include "mlir/Target/LLVMIR/Export.h"
 #include "mlir/Tools/mlir-translate/MlirTranslateMain.h"
 #include "mlir/Tools/mlir-translate/Translation.h"
 #include "llvm/IR/LLVMContext.h"
@@ -20,7 +19,7 @@ static mlir::LogicalResult exportLLVMIR(mlir::Operation *op,
                                         llvm::raw_ostream &stream) {
   llvm::LLVMContext context;
   std::unique_ptr<llvm::Module> module =
-      mlir::translateModuleToLLVMIR(op, context);
+      piko::translate(op, context, "pipeline");
   if (!module)
     return mlir::failure();
   module->print(stream, nullptr);

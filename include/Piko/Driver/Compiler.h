@@ -90,6 +90,13 @@ lowerForEach(llvm::ArrayRef<CPUOptions> cpus, mlir::ModuleOp module,
              const CheckOptions &check, const SynthesisOptions &synthesis,
              const GPUOptions &gpu);
 
+/// LLVM IR, not optimised, of what the llvm dialect has, a module or a
+/// `gpu.module`, with what it has inline of the runtime. Null after
+/// diagnostics.
+std::unique_ptr<llvm::Module> translate(mlir::Operation *op,
+                                        llvm::LLVMContext &context,
+                                        llvm::StringRef name);
+
 /// LLVM IR, not optimised, of a module at Level::LLVM, with its kernels for a
 /// GPU as `gpu` says: PTX made with `optLevel`, and cubins, or functions for
 /// the emulator. Null after diagnostics.

@@ -6,12 +6,14 @@
 
 #include "Piko/Analysis/TargetModel.h"
 #include "Piko/Conversion/Passes.h"
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
 
 #include "mlir/Conversion/ArithToLLVM/ArithToLLVM.h"
 #include "mlir/Conversion/ControlFlowToLLVM/ControlFlowToLLVM.h"
 #include "mlir/Conversion/FuncToLLVM/ConvertFuncToLLVM.h"
 #include "mlir/Conversion/GPUToNVVM/GPUToNVVMPass.h"
 #include "mlir/Conversion/LLVMCommon/ConversionTarget.h"
+#include "mlir/Conversion/LLVMCommon/Pattern.h"
 #include "mlir/Conversion/LLVMCommon/TypeConverter.h"
 #include "mlir/Conversion/MathToLLVM/MathToLLVM.h"
 #include "mlir/Conversion/MemRefToLLVM/MemRefToLLVM.h"
@@ -36,6 +38,58 @@ struct ConvertGPUToExactNVVMPass
   void runOnOperation() override;
 };
 } // namespace
+
+namespace {
+/// A call of a function that is declared on first use.
+struct DeviceCallLowering : ConvertOpToLLVMPattern<DeviceCallOp> {
+  using ConvertOpToLLVMPattern::ConvertOpToLLVMPattern;
+  LogicalResult
+  matchAndRewrite(DeviceCallOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override;
+
+private:
+  /// A memref as a pointer that is of no address space.
+  Value toPointer(Value memref, Value descriptor, OpBuilder &builder) const;
+};
+} // namespace
+
+Value DeviceCallLowering::toPointer(Value memref, Value descriptor,
+                                    OpBuilder &builder) const {
+  Location loc = memref.getLoc();
+  Value pointer = MemRefDescriptor(descriptor)
+                      .bufferPtr(builder, loc, *getTypeConverter(),
+                                 cast<MemRefType>(memref.getType()));
+  auto generic = LLVM::LLVMPointerType::get(builder.getContext());
+  return pointer.getType() == generic
+             ? pointer
+             : LLVM::AddrSpaceCastOp::create(builder, loc, generic, pointer)
+                   .getResult();
+}
+
+LogicalResult
+DeviceCallLowering::matchAndRewrite(DeviceCallOp op, OpAdaptor adaptor,
+                                    ConversionPatternRewriter &rewriter) const {
+  SmallVector<Value> arguments;
+  for (auto [operand, converted] : llvm::zip(op.getArgs(), adaptor.getArgs()))
+    arguments.push_back(isa<MemRefType>(operand.getType())
+                            ? toPointer(operand, converted, rewriter)
+                            : converted);
+  Type result = op.getResult()
+                    ? typeConverter->convertType(op.getResult().getType())
+                    : Type(LLVM::LLVMVoidType::get(op.getContext()));
+  auto kernels = op->getParentOfType<gpu::GPUModuleOp>();
+  auto callee = kernels.lookupSymbol<LLVM::LLVMFuncOp>(op.getCallee());
+  if (!callee) {
+    OpBuilder::InsertionGuard guard(rewriter);
+    rewriter.setInsertionPointToStart(kernels.getBody());
+    callee = LLVM::LLVMFuncOp::create(
+        rewriter, op.getLoc(), op.getCallee(),
+        LLVM::LLVMFunctionType::get(
+            result, llvm::to_vector(ValueRange(arguments).getTypes())));
+  }
+  rewriter.replaceOpWithNewOp<LLVM::CallOp>(op, callee, arguments);
+  return success();
+}
 
 static bool isInSharedMemory(Value pointer) {
   return cast<LLVM::LLVMPointerType>(pointer.getType()).getAddressSpace() ==
@@ -99,6 +153,7 @@ void ConvertGPUToExactNVVMPass::runOnOperation() {
   populateFuncToLLVMConversionPatterns(converter, patterns);
   populateMathToLLVMConversionPatterns(converter, patterns);
   ub::populateUBToLLVMConversionPatterns(converter, patterns);
+  patterns.add<DeviceCallLowering>(converter);
   LLVMConversionTarget target(getContext());
   target.addLegalDialect<NVVM::NVVMDialect>();
   target.addLegalOp<gpu::GPUModuleOp>();

@@ -8,11 +8,14 @@
 
 #include "PikoToLLVM/RuntimeABI.h"
 
+#include "Piko/Conversion/AliasNames.h"
+
 using namespace mlir;
 using namespace piko;
 
 LLVM::TBAANodeAttr AliasTags::root() const {
-  return LLVM::TBAARootAttr::get(context, StringAttr::get(context, "piko"));
+  return LLVM::TBAARootAttr::get(context,
+                                 StringAttr::get(context, aliasNames::root));
 }
 
 LLVM::TBAATypeDescriptorAttr AliasTags::node(const Twine &name,
@@ -23,7 +26,7 @@ LLVM::TBAATypeDescriptorAttr AliasTags::node(const Twine &name,
 }
 
 LLVM::TBAATypeDescriptorAttr AliasTags::runtime() const {
-  return node("runtime", root());
+  return node(aliasNames::runtime, root());
 }
 
 ArrayAttr AliasTags::tag(LLVM::TBAATypeDescriptorAttr node,
@@ -46,7 +49,9 @@ ArrayAttr AliasTags::record() const { return tag(runtime()); }
 
 ArrayAttr AliasTags::dirty() const { return tag(node("dirty", root())); }
 
-ArrayAttr AliasTags::writer() const { return tag(node("writer", runtime())); }
+ArrayAttr AliasTags::writer() const {
+  return tag(node(aliasNames::writer, runtime()));
+}
 
 ArrayAttr AliasTags::input() const { return tag(node("input", runtime())); }
 
@@ -54,10 +59,6 @@ ArrayAttr AliasTags::call(StringRef function) const {
   if (isFailure(function))
     return tag(node("failure", root()));
   static constexpr StringRef emissions[] = {
-      PIKO_RUNTIME_FUNCTION(pikoir_append).name,
-      PIKO_RUNTIME_FUNCTION(pikoir_reserve).name,
-      PIKO_RUNTIME_FUNCTION(pikoir_place).name,
-      PIKO_RUNTIME_FUNCTION(pikoir_next).name,
       PIKO_RUNTIME_FUNCTION(pikoir_place_source).name,
       PIKO_RUNTIME_FUNCTION(pikoir_reorder_begin).name,
       PIKO_RUNTIME_FUNCTION(pikoir_reorder_end).name,

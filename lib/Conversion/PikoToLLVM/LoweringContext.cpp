@@ -298,15 +298,6 @@ Value LoweringContext::member(OpBuilder &builder, Value bins,
   return known;
 }
 
-/// Whether a function of the runtime is hardly ever called, though there is a
-/// call for each primitive: LLVM then moves out of the way what leads to it.
-static bool isCold(StringRef function) {
-  return isFailure(function) ||
-         function == PIKO_RUNTIME_FUNCTION(pikoir_append).name ||
-         function == PIKO_RUNTIME_FUNCTION(pikoir_place).name ||
-         function == PIKO_RUNTIME_FUNCTION(pikoir_next).name;
-}
-
 LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
                                    const RuntimeFunction &function,
                                    ValueRange arguments) {
@@ -323,7 +314,7 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
         builder, loc, function.name,
         LLVM::LLVMFunctionType::get(
             convertType(builder.getContext(), function.result), parameters));
-    if (isCold(function.name))
+    if (isFailure(function.name))
       callee.setPassthroughAttr(
           builder.getArrayAttr(builder.getStringAttr("cold")));
   }
@@ -331,6 +322,14 @@ LLVM::CallOp LoweringContext::call(OpBuilder &builder, Location loc,
   if (ArrayAttr tag = tags.call(function.name))
     call.setTbaaAttr(tag);
   return call;
+}
+
+Value LoweringContext::test(OpBuilder &builder, Location loc,
+                            const RuntimeFunction &function,
+                            ValueRange arguments) {
+  Value result = call(builder, loc, function, arguments).getResult();
+  return arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ne, result,
+                               createI32(builder, loc, 0));
 }
 
 LLVM::LLVMFuncOp LoweringContext::pureFunction(OpBuilder &builder,

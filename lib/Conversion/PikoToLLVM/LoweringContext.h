@@ -138,6 +138,9 @@ public:
   mlir::LLVM::CallOp call(mlir::OpBuilder &builder, mlir::Location loc,
                           const RuntimeFunction &function,
                           mlir::ValueRange arguments);
+  /// Whether a number of 32 bits that it gives is not 0.
+  mlir::Value test(mlir::OpBuilder &builder, mlir::Location loc,
+                   const RuntimeFunction &function, mlir::ValueRange arguments);
 
   /// The function of that name and type, which does nothing but compute.
   /// Declared on first use.

@@ -9,6 +9,7 @@
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
+#include "Piko/Dialect/Piko/IR/PikoGPU.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlow.h"
@@ -189,6 +190,8 @@ LogicalResult ConvertPikoToLLVMPass::convert(PipelineOp pipeline,
   });
   ConversionTarget target(getContext());
   target.addIllegalDialect<PikoDialect>();
+  // A kernel for a GPU keeps it until it is outlined.
+  target.addLegalOp<DeviceCallOp>();
   // Of other dialects' accesses only they themselves could make code.
   target.markUnknownOpDynamicallyLegal(
       [](Operation *op) { return !isa<StateAccessOpInterface>(op); });

@@ -7,6 +7,7 @@
 //
 //===----------------------------------------------------------------------===//
 
+#include "common/JoinRules.h"
 #include "cpu/Kernel.h"
 #include "cpu/Parallel.h"
 
@@ -117,20 +118,9 @@ private:
     }
   }
 
-  static uint64_t word(const Keys &keys, int64_t item, int32_t w) {
-    return w < keys.width ? keys.word(item, w) : 0;
-  }
-
   /// True if record i of stream a comes before record j of stream b.
   bool before(size_t a, int64_t i, size_t b, int64_t j) const {
-    const Keys &x = from_[a].keys, &y = from_[b].keys;
-    int32_t width = std::max(x.width, y.width);
-    for (int32_t w = 0; w < width; ++w) {
-      uint64_t u = word(x, i, w), v = word(y, j, w);
-      if (u != v)
-        return u < v;
-    }
-    return a < b;
+    return join::comesBefore(from_[a].keys, i, from_[b].keys, j, a < b);
   }
 
   void forChunks(auto &&body) {
@@ -168,7 +158,7 @@ private:
       std::memcpy(out_.itemStorage.data() + to * size_, item,
                   static_cast<size_t>(size_));
     for (int32_t w = 0; w < out_.keys.width; ++w)
-      out_.keys.words[to * out_.keys.width + w] = word(from_[s].keys, i, w);
+      out_.keys.words[to * out_.keys.width + w] = from_[s].keys.word(i, w);
   }
 
   void mergePairs() {

@@ -12,6 +12,7 @@
 //
 //===----------------------------------------------------------------------===//
 
+#include "common/JoinRules.h"
 #include "cpu/Kernel.h"
 #include "cpu/state/Mirrors.h"
 
@@ -35,10 +36,9 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
                  const BinSchedule &schedule, int64_t positions) {
   if (schedule.tileSplit > 0 && !stage.sharesTile)
     return schedule.tileSplit;
-  if (p.accelerator) { // a unit is a block's
-    int64_t share = positions / (p.accelerator->residentThreads() / 64);
-    return std::clamp<int64_t>((share + 63) / 64 * 64, 64, 1024);
-  }
+  if (p.accelerator)
+    return join::blockUnitSize(0, positions,
+                               p.accelerator->residentThreads() / 64);
   int64_t share = positions / (int64_t(p.threads) * 8);
   // One of a few primitives may have most of the domain's pixels.
   int64_t most = stage.selections.empty() ? 1024 : 64;
@@ -176,7 +176,7 @@ private:
   void makeCalls() {
     int64_t calls = 0;
     forBins([&](int64_t, int64_t count, int64_t batch) {
-      calls += std::max<int64_t>(1, (count + batch - 1) / batch);
+      calls += join::callCount(count, batch, /*runsEmpty=*/true);
     });
     kernel_.calls = Array<pikoir_call>(p_.memory, calls);
     calls = 0;
@@ -195,10 +195,8 @@ private:
     for (int64_t bin = 0; bin < stage_.bins(); ++bin) {
       const BinSchedule &schedule = stage_.scheduleOf(bin);
       int64_t count = offsets_[bin + 1] - offsets_[bin];
-      if (count > 0 || (schedule.everyBin && kernel_.firstRound)) {
-        int64_t batch = schedule.batch ? schedule.batch : count;
-        body(bin, count, std::clamp<int64_t>(batch, 1, UINT32_MAX));
-      }
+      if (count > 0 || (schedule.everyBin && kernel_.firstRound))
+        body(bin, count, join::callSize(schedule.batch, count));
     }
   }
 

@@ -57,8 +57,7 @@ void StageLoop::start(bool fromOutside) {
                        for (int64_t i = begin; i < end; ++i) {
                          int64_t place = places_[m] ? places_[m][i] : i;
                          for (int32_t w = 0; w < width; ++w)
-                           keys_[place * width + w] =
-                               w < keys.width ? keys.word(i, w) : 0;
+                           keys_[place * width + w] = keys.word(i, w);
                        }
                      });
     }

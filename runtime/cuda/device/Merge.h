@@ -9,6 +9,7 @@
 #ifndef PIKO_RUNTIME_CUDA_DEVICE_MERGE_H
 #define PIKO_RUNTIME_CUDA_DEVICE_MERGE_H
 
+#include "common/JoinRules.h"
 #include "cuda/device/Entries.h"
 
 namespace piko::cuda {
@@ -47,12 +48,7 @@ public:
 private:
   /// True if item i of stream a comes before item j of stream b.
   bool before(int32_t a, int64_t i, int32_t b, int64_t j) const {
-    for (int32_t w = 0; w < width_; ++w) {
-      uint64_t u = streams_[a].keys.word(i, w), v = streams_[b].keys.word(j, w);
-      if (u != v)
-        return u < v;
-    }
-    return a < b;
+    return join::comesBefore(streams_[a].keys, i, streams_[b].keys, j, a < b);
   }
 
   const Stream *streams_;

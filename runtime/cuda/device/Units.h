@@ -10,6 +10,7 @@
 #ifndef PIKO_RUNTIME_CUDA_DEVICE_UNITS_H
 #define PIKO_RUNTIME_CUDA_DEVICE_UNITS_H
 
+#include "common/JoinRules.h"
 #include "cuda/device/Binning.h"
 
 namespace piko::cuda {
@@ -101,10 +102,7 @@ private:
   }
 
   int64_t unitSize(int64_t tileSplit) const {
-    if (tileSplit > 0)
-      return tileSplit;
-    int64_t share = ceilDivide(bins_.positions / args_.unitsAtOnce, 64) * 64;
-    return smaller<int64_t>(larger<int64_t>(share, 64), 1024);
+    return join::blockUnitSize(tileSplit, bins_.positions, args_.unitsAtOnce);
   }
 
   template <class UnitAt> void addUnits(int64_t count, const UnitAt &unitAt) {
@@ -122,22 +120,20 @@ private:
   }
 
   bool isCutByBin() const { return args_.cutting == CutBins; }
-  /// Calls of a bin that has nothing.
-  int64_t leastCallsOf(int64_t bin) const {
+  /// Whether a bin that has nothing is called.
+  bool runsEmpty(int64_t bin) const {
     return everyBin_ && (!isCutByBin() || args_.cuts[bin].everyBin);
   }
   int64_t batchOf(int64_t bin, int64_t count) const {
-    int64_t batch = isCutByBin() ? args_.cuts[bin].batch : args_.batch;
-    batch = batch > 0 ? batch : count;
-    return smaller<int64_t>(larger<int64_t>(batch, 1), UINT32_MAX);
+    return join::callSize(isCutByBin() ? args_.cuts[bin].batch : args_.batch,
+                          count);
   }
 
   void cutCalls() {
     Pieces all = cut(
         [&](int64_t bin) {
           int64_t count = countOf(bin);
-          return larger(leastCallsOf(bin),
-                        ceilDivide(count, batchOf(bin, count)));
+          return join::callCount(count, batchOf(bin, count), runsEmpty(bin));
         },
         everyBin_);
     auto callAt = [&](int64_t c) -> pikoir_call {

@@ -445,61 +445,6 @@ PIKORT_API int64_t pikoir_loop_limit(pikort_pipeline *p);
 PIKORT_API int32_t pikoir_fail_text(pikort_pipeline *p, int32_t code,
                                     const char *text);
 
-// --- the fast path, which generated code has inline --------------------------
-
-static inline uint8_t *pikoir_append_inline(pikoir_writer *writer,
-                                            int32_t port) {
-  pikoir_port *out = &writer->ports[port];
-  uint8_t *record = out->cursor;
-  if (record > out->limit ||
-      (out->flags & ~(PIKOIR_PORT_LOCAL | PIKOIR_PORT_COUNTS)) != 0)
-    return pikoir_append(writer, port);
-  ++out->emitted;
-  if (out->buckets != 0) // kept by its first place
-    out->last_bucket = -1;
-  else
-    out->cursor = record + out->size;
-  return record;
-}
-
-static inline void pikoir_place_inline(pikoir_writer *writer, int32_t port,
-                                       int64_t bucket) {
-  pikoir_port *out = &writer->ports[port];
-  if (bucket <= out->last_bucket || bucket >= out->buckets ||
-      out->bucket_cursor == out->bucket_end ||
-      (out->flags & ~(PIKOIR_PORT_COUNTS | PIKOIR_PORT_SOURCE)) != 0) {
-    pikoir_place(writer, port, bucket);
-    return;
-  }
-  uint32_t entry = (uint32_t)bucket;
-  if (out->last_bucket < 0) {
-    entry |= PIKOIR_FIRST_BUCKET;
-    out->cursor += out->size;
-    out->run = out->bucket_cursor;
-    ++out->kept;
-  }
-  *out->bucket_cursor++ = entry;
-  out->last_bucket = bucket;
-}
-
-/// pikoir_place for a port whose edge is local.
-static inline void pikoir_place_local_inline(pikoir_writer *writer,
-                                             int32_t port, int64_t bucket) {
-  pikoir_port *out = &writer->ports[port];
-  if ((uint64_t)bucket >= (uint64_t)out->buckets || out->last_bucket != -1 ||
-      (out->flags & ~PIKOIR_PORT_LOCAL) != 0) {
-    pikoir_place(writer, port, bucket);
-    return;
-  }
-  out->cursor += out->size;
-  out->last_bucket = bucket;
-}
-
-static inline void pikoir_next_inline(pikoir_writer *writer) {
-  if (writer->flags != 0)
-    pikoir_next(writer);
-}
-
 #ifdef __cplusplus
 } // extern "C"
 #endif

@@ -2,6 +2,7 @@
 //===- GraphRun.cpp - Test pipelines through the ABI ----------------------===//
 
 #include "graph/Graph.h"
+#include "pikort/emission.h"
 
 #include <algorithm>
 #include <cstddef>

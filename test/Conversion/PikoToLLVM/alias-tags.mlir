@@ -1,5 +1,5 @@
 // RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu=lanes=4 %s | FileCheck %s
-// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu=lanes=4 --piko-cpu-to-llvm %s | mlir-translate --mlir-to-llvmir | FileCheck %s --check-prefix=IR
+// RUN: piko-opt --piko-synthesize --piko-to-machine --piko-to-cpu=lanes=4 --piko-cpu-to-llvm %s | piko-translate --mlir-to-llvmir | FileCheck %s --check-prefix=IR
 // LLVM is told what accesses touch, so that a store to a buffer is none to
 // another field, to another buffer, to primitives or to what the runtime holds.
 
@@ -14,15 +14,12 @@ piko.record @C {"scale" : f32 at 0} size 4 align 4
 // CHECK-DAG: #[[RUNTIME:.*]] = #llvm.tbaa_type_desc<id = "runtime", members = {<#[[ROOT]], 0>}>
 // CHECK-DAG: #[[PRIM_X:.*]] = #llvm.tbaa_type_desc<id = "primitive F.x", members = {<#[[RUNTIME]], 0>}>
 // CHECK-DAG: #[[EMITTED_X:.*]] = #llvm.tbaa_type_desc<id = "primitive F.b.x", members = {<#[[RUNTIME]], 0>}>
-// CHECK-DAG: #[[WRITER:.*]] = #llvm.tbaa_type_desc<id = "writer", members = {<#[[RUNTIME]], 0>}>
 // CHECK-DAG: #[[OUT_X_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[OUT_X]], access_type = #[[OUT_X]], offset = 0>
 // CHECK-DAG: #[[OUT_V_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[OUT_V]], access_type = #[[OUT_V]], offset = 0>
 // CHECK-DAG: #[[SCALE_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[SCALE]], access_type = #[[SCALE]], offset = 0, constant = true>
 // CHECK-DAG: #[[FAILURE_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[FAILURE]],
-// CHECK-DAG: #[[RUNTIME_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[RUNTIME]],
 // CHECK-DAG: #[[PRIM_X_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[PRIM_X]],
 // CHECK-DAG: #[[EMITTED_X_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[EMITTED_X]],
-// CHECK-DAG: #[[WRITER_TAG:.*]] = #llvm.tbaa_tag<base_type = #[[WRITER]],
 
 // CHECK-LABEL: func.func private @P.kernel_a
 // CHECK:         llvm.load %{{.*}} {tbaa = [#[[PRIM_X_TAG]]]} : !llvm.ptr -> i32
@@ -30,8 +27,7 @@ piko.record @C {"scale" : f32 at 0} size 4 align 4
 // CHECK:         llvm.store %{{.*}} {tbaa = [#[[OUT_V_TAG]]]} : f32
 // CHECK:         llvm.atomicrmw {{.*}} {tbaa = [#[[OUT_X_TAG]]]}
 // CHECK:         llvm.call @pikoir_fail_index({{.*}}) {tbaa = [#[[FAILURE_TAG]]]}
-// CHECK:         llvm.load %{{.*}} {tbaa = [#[[WRITER_TAG]]]} : !llvm.ptr -> !llvm.ptr
-// CHECK:         llvm.call @pikoir_append({{.*}}) {tbaa = [#[[RUNTIME_TAG]]]}
+// CHECK:         llvm.call @pikoir_append_inline({{.*}})
 // CHECK:         llvm.store %{{.*}} {tbaa = [#[[EMITTED_X_TAG]]]} : i32
 
 // Calls, too: what a failed test calls leaves state as it is.

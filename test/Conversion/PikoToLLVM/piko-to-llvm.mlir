@@ -11,8 +11,7 @@ piko.record @F {"x" : i32 at 0, "w" : f32[4 : 4] at 4} size 20 align 4
 // CHECK:         omp.parallel
 // CHECK:           llvm.call @pikoir_open
 // CHECK:           %[[W:.*]] = llvm.load %{{.*}} {{.*}}: !llvm.ptr -> f32
-// CHECK:           %[[ROOM:.*]] = scf.if
-// CHECK:             llvm.call @pikoir_append
+// CHECK:           %[[ROOM:.*]] = llvm.call @pikoir_append
 // CHECK:           llvm.store %{{.*}}, %[[ROOM]] {{.*}}: i32
 // CHECK:           llvm.store %[[W]]
 // CHECK:           llvm.call @pikoir_next

@@ -47,10 +47,6 @@ void createKeep(mlir::OpBuilder &builder, mlir::Location loc,
 mlir::Value createLocalBins(mlir::OpBuilder &builder, mlir::Operation *op,
                             const GridContext &grid, int64_t buffer);
 
-void populateBlockOutputPatterns(const mlir::TypeConverter &converter,
-                                 mlir::RewritePatternSet &patterns,
-                                 LoweringContext &context);
-
 } // namespace piko
 
 #endif // PIKO_LIB_CONVERSION_PIKOTOLLVM_GRIDLOG_H

@@ -11,6 +11,7 @@
 #include "PikoToLLVM/Records/WriterPaths.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+#include "pikort/emission.h"
 
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
@@ -190,9 +191,13 @@ private:
                            adaptor.getValues().slice(i * numbers, numbers));
     // The last piece may go beyond the last record.
     int64_t beyond = llvm::divideCeil(pieceSize, record.getSize());
-    Value at = createReserve(
-        builder, loc, context, adaptor.getWriter(), emissions.port,
-        emissions.lanes * int64_t(records.size()) + beyond);
+    int64_t most = emissions.lanes * int64_t(records.size()) + beyond;
+    Value at =
+        context
+            .call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_reserve_inline),
+                  {adaptor.getWriter(), createI32(builder, loc, emissions.port),
+                   createI64(builder, loc, most)})
+            .getResult();
     for (int64_t lane = 0; lane < emissions.lanes; ++lane)
       for (auto [one, bits] : llvm::zip(records, emissions.bits)) {
         one.store(lane, at);
@@ -261,7 +266,10 @@ struct AppendRecordLowering : Lowering<AppendRecordOp> {
     Location loc = op.getLoc();
     RecordOp record = context.record(op.getPrim().getType().getRecord());
     Value room =
-        createAppend(rewriter, loc, context, adaptor.getWriter(), op.getPort());
+        context
+            .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_append_inline),
+                  {adaptor.getWriter(), createI32(rewriter, loc, op.getPort())})
+            .getResult();
     CodeBuilder code(rewriter, loc);
     Value lane = toI64(rewriter, loc, op.getLane());
     Value group = arith::ShRUIOp::create(rewriter, loc, lane,

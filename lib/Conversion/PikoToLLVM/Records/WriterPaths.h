@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What emissions do nearly always, without a call of the runtime: what the
-// inline functions of pikort/abi.h do.
+// What lanes emit at once, by the inline functions of pikort/emission.h.
 
 #ifndef PIKO_LIB_CONVERSION_PIKOTOLLVM_WRITERPATHS_H
 #define PIKO_LIB_CONVERSION_PIKOTOLLVM_WRITERPATHS_H
@@ -10,26 +9,6 @@
 
 namespace piko {
 
-/// Whether a unit runs a loop of its kernel as vectors, by its number.
-mlir::Value createTakesVectors(mlir::OpBuilder &builder, mlir::Location loc,
-                               LoweringContext &context, mlir::Value writer,
-                               int64_t number);
-/// The place of the next record of a port (pikoir_append).
-mlir::Value createAppend(mlir::OpBuilder &builder, mlir::Location loc,
-                         LoweringContext &context, mlir::Value writer,
-                         int64_t port);
-/// Puts a port's latest record into a bucket, an i64 (pikoir_place).
-void createPlace(mlir::OpBuilder &builder, mlir::Location loc,
-                 LoweringContext &context, mlir::Value writer, int64_t port,
-                 mlir::Value bucket);
-/// The same where the port's edge is local.
-void createLocalPlace(mlir::OpBuilder &builder, mlir::Location loc,
-                      LoweringContext &context, mlir::Value writer,
-                      int64_t port, mlir::Value bucket);
-/// Where so many records of a port may be written (pikoir_reserve).
-mlir::Value createReserve(mlir::OpBuilder &builder, mlir::Location loc,
-                          LoweringContext &context, mlir::Value writer,
-                          int64_t port, int64_t count);
 /// What lanes emit to a port: a bit for each in an i64, and the buckets.
 struct LaneEmissions {
   int64_t port, lanes;
@@ -51,15 +30,6 @@ bool isLocalEdge(mlir::Operation *op, int64_t port,
 mlir::Value createTileCount(mlir::OpBuilder &builder, mlir::Operation *op,
                             mlir::FlatSymbolRefAttr stage,
                             LoweringContext &context);
-/// Whether pikoir_next has anything to do.
-mlir::Value createIsCounted(mlir::OpBuilder &builder, mlir::Location loc,
-                            LoweringContext &context, mlir::Value writer);
-/// Ends a primitive of a source, to whose AssignBin the writer belongs.
-void createSourceNext(mlir::OpBuilder &builder, mlir::Location loc,
-                      LoweringContext &context, mlir::Value writer);
-/// Ends a position (pikoir_next).
-void createNext(mlir::OpBuilder &builder, mlir::Location loc,
-                LoweringContext &context, mlir::Value writer);
 
 } // namespace piko
 

@@ -8,6 +8,7 @@
 #include "PikoToLLVM/Records/WriterPaths.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"
+#include "pikort/emission.h"
 
 using namespace mlir;
 using namespace piko;
@@ -69,9 +70,11 @@ struct TakesVectorsLowering : Lowering<TakesVectorsOp> {
   LogicalResult
   matchAndRewrite(TakesVectorsOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(op,
-                       createTakesVectors(rewriter, op.getLoc(), context,
-                                          adaptor.getWriter(), op.getNumber()));
+    rewriter.replaceOp(
+        op, context.test(rewriter, op.getLoc(),
+                         PIKO_RUNTIME_FUNCTION(pikoir_takes_vectors_inline),
+                         {adaptor.getWriter(),
+                          createI64(rewriter, op.getLoc(), op.getNumber())}));
     return success();
   }
 };
@@ -129,9 +132,13 @@ struct NextLowering : Lowering<NextOp> {
       createEntry(rewriter, op, *grid, EntryKind::Next, /*number=*/0,
                   /*bytes=*/0, getLogStage(op, op.getWriter(), context));
     else if (op->getParentOfType<func::FuncOp>()->hasAttr(marks::source))
-      createSourceNext(rewriter, op.getLoc(), context, adaptor.getWriter());
+      context.call(rewriter, op.getLoc(),
+                   PIKO_RUNTIME_FUNCTION(pikoir_next_source_inline),
+                   adaptor.getWriter());
     else
-      createNext(rewriter, op.getLoc(), context, adaptor.getWriter());
+      context.call(rewriter, op.getLoc(),
+                   PIKO_RUNTIME_FUNCTION(pikoir_next_inline),
+                   adaptor.getWriter());
     rewriter.eraseOp(op);
     return success();
   }
@@ -142,8 +149,10 @@ struct IsCountedLowering : Lowering<IsCountedOp> {
   LogicalResult
   matchAndRewrite(IsCountedOp op, OpAdaptor adaptor,
                   ConversionPatternRewriter &rewriter) const override {
-    rewriter.replaceOp(op, createIsCounted(rewriter, op.getLoc(), context,
-                                           adaptor.getWriter()));
+    rewriter.replaceOp(
+        op, context.test(rewriter, op.getLoc(),
+                         PIKO_RUNTIME_FUNCTION(pikoir_is_counted_inline),
+                         adaptor.getWriter()));
     return success();
   }
 };
@@ -221,7 +230,11 @@ struct AppendLowering : Lowering<AppendOp> {
       if (buffer && !grid->placed[buffer - 1])
         createKeep(rewriter, loc, *grid, buffer);
     } else {
-      room = createAppend(rewriter, loc, context, adaptor.getWriter(), port);
+      room =
+          context
+              .call(rewriter, loc, PIKO_RUNTIME_FUNCTION(pikoir_append_inline),
+                    {adaptor.getWriter(), createI32(rewriter, loc, port)})
+              .getResult();
     }
     SmallVector<ArrayAttr> tags; // of each number
     for (auto field : record.getFields().getAsRange<FieldAttr>())
@@ -259,13 +272,17 @@ struct PlaceLowering : Lowering<AppendBinOp> {
                                   /*bytes=*/8, from);
         LLVM::StoreOp::create(rewriter, loc, bucket, entry);
       }
-    } else if (op.getPort() &&
-               isLocalEdge(op, *op.getPort(), op.getStageAttr(), context))
-      createLocalPlace(rewriter, loc, context, adaptor.getWriter(),
-                       *op.getPort(), bucket);
-    else // a source's buckets are those of its only port
-      createPlace(rewriter, loc, context, adaptor.getWriter(),
-                  op.getPort().value_or(0), bucket);
+    } else {
+      bool isLocal = op.getPort() &&
+                     isLocalEdge(op, *op.getPort(), op.getStageAttr(), context);
+      // A source's buckets are those of its only port.
+      context.call(rewriter, loc,
+                   isLocal ? PIKO_RUNTIME_FUNCTION(pikoir_place_local_inline)
+                           : PIKO_RUNTIME_FUNCTION(pikoir_place_inline),
+                   {adaptor.getWriter(),
+                    createI32(rewriter, loc, op.getPort().value_or(0)),
+                    bucket});
+    }
     rewriter.eraseOp(op);
     return success();
   }

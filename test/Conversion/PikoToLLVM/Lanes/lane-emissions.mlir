@@ -14,10 +14,7 @@ piko.record @G {"x" : f32 at 0, "a" : i8 at 4, "b" : i16 at 6, "d" : f64 at 8, "
 // CHECK:           arith.shli %{{.*}} : vector<4xi32>
 // CHECK:           arith.ori %{{.*}} : vector<4xi32>
 // CHECK:           vector.shuffle %{{.*}}, %{{.*}} [0, 4, 1, 5]
-// CHECK:           %[[LIMIT:.*]] = llvm.icmp "ugt"
-// CHECK-NEXT:      scf.if %[[LIMIT]] {
-// CHECK-NEXT:        llvm.call @pikoir_reserve(%[[W]], %c0_i32, %c5_i64)
-// CHECK:           %[[ROOM:.*]] = llvm.load %{{.*}} : !llvm.ptr -> !llvm.ptr
+// CHECK:           %[[ROOM:.*]] = llvm.call @pikoir_reserve_inline(%[[W]], %c0_i32, %c5_i64)
 // CHECK:           llvm.store %{{.*}}, %[[ROOM]] {alignment = 4 : i64{{.*}}} : vector<4xi32>, !llvm.ptr
 // CHECK:           %[[BEHIND:.*]] = llvm.getelementptr inbounds %[[ROOM]][16]
 // CHECK:           llvm.store %{{.*}}, %[[BEHIND]] {alignment = 4 : i64{{.*}}} : vector<4xi32>, !llvm.ptr
@@ -27,14 +24,19 @@ piko.record @G {"x" : f32 at 0, "a" : i8 at 4, "b" : i16 at 6, "d" : f64 at 8, "
 // CHECK:           llvm.store %{{.*}}, %[[NEXT]] {alignment = 4 : i64{{.*}}} : vector<4xi32>, !llvm.ptr
 //
 // A cell outside of the grid, or no room for all, is the runtime's business.
+// CHECK:           llvm.call @pikoir_buckets_inline(%[[W]], %c0_i32)
 // CHECK:           arith.cmpi uge, %{{.*}} : vector<4xi64>
+// CHECK:           llvm.call @pikoir_places_apart_inline(%[[W]], %c0_i32, %c4_i64)
 // CHECK:           scf.if
 // CHECK:             scf.for
-// CHECK:               llvm.call @pikoir_place(%[[W]], %c0_i32
+// CHECK:               llvm.call @pikoir_place_apart_inline(%[[W]], %c0_i32
 // CHECK:           } else {
-// CHECK:             math.ctpop %[[BITS]]
+// CHECK:             %[[COUNT:.*]] = math.ctpop %[[BITS]]
+// CHECK:             %[[PLACE:.*]] = llvm.call @pikoir_place_lanes_inline(%[[W]], %c0_i32, %[[COUNT]])
 // CHECK:             arith.ori %{{.*}} : vector<4xi32>
-// CHECK-COUNT-4:     llvm.store %{{.*}} : i32, !llvm.ptr
+// CHECK:             llvm.store %{{.*}}, %[[PLACE]] {{.*}} : i32, !llvm.ptr
+// CHECK-COUNT-3:     llvm.store %{{.*}} : i32, !llvm.ptr
+// CHECK:             llvm.call @pikoir_end_buckets_inline(%[[W]], %c0_i32,
 piko.pipeline @P rank 1 {
   piko.buffer @out : @G
   piko.source @a

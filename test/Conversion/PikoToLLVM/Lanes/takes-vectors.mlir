@@ -5,10 +5,8 @@ piko.record @F {"x" : i32 at 0} size 4 align 4
 // A bit of the writer says which version a unit runs.
 // CHECK-LABEL: func.func private @P.k(
 // CHECK:         %[[W:.*]] = llvm.call @pikoir_open
-// CHECK:         %[[AT:.*]] = llvm.getelementptr inbounds %[[W]][32]
-// CHECK:         %[[BITS:.*]] = llvm.load %[[AT]] {{.*}}: !llvm.ptr -> i64
-// CHECK:         %[[BIT:.*]] = arith.andi %[[BITS]], %c2_i64
-// CHECK:         %[[TAKES:.*]] = arith.cmpi ne, %[[BIT]], %c0_i64
+// CHECK:         %[[BIT:.*]] = llvm.call @pikoir_takes_vectors_inline(%[[W]], %c1_i64)
+// CHECK:         %[[TAKES:.*]] = arith.cmpi ne, %[[BIT]], %c0_i32
 // CHECK:         scf.if %[[TAKES]]
 
 // The setup declares loops by number; where some are gone, others move up.

@@ -120,6 +120,25 @@ def Piko_FlushOp : Piko_GPUOp<"flush"> {
       "$log `[` $unit `]` `using` $words attr-dict `:` type($words)";
 }
 
+def Piko_DeviceCallOp : Piko_GPUOp<"call"> {
+  let summary = "calls what kernels have inline of the runtime";
+  let description = [{
+    A function of `pikort/grid_log.h`, of which the compiler has bitcode. It is
+    linked into the kernel and inlined when that is LLVM IR. A memref is passed as
+    the address of its first element.
+
+    ```mlir
+    piko.gpu.call "pikoir_grid_keep"(%buffers, %stride, %1)
+      : (memref<14xi64>, i64, i64) -> ()
+    ```
+  }];
+  let arguments = (ins StrAttr:$callee, Variadic<AnyType>:$args);
+  let results = (outs Optional<AnyType>:$result);
+  let assemblyFormat = [{
+    $callee `(` $args `)` attr-dict `:` functional-type(operands, results)
+  }];
+}
+
 def Piko_AllocateOp : Piko_GPUOp<"allocate"> {
   let summary = "takes memory for a block, by one of its threads";
   let description = [{
