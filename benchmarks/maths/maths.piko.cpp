@@ -7,8 +7,16 @@ struct State {
   piko::Buffer<float> in, out;
 };
 struct Apply : piko::Stage<0, 0, 64, int>, piko::Uses<State> {
-  void process(const int &i) {
-    state().out[i] = piko::MATHS_FUNCTION(state().in[i]);
+  void schedule(piko::BinId) {
+    specifyLanes(piko::Lanes::Iterations);
+#ifdef MATHS_ULPS
+    specifyUlps(MATHS_ULPS);
+#endif
+  }
+  void process(const int &) {
+    parallelFor(int(state().in.size()), [&](int i) {
+      state().out[i] = piko::MATHS_FUNCTION(state().in[i]);
+    });
   }
 };
 struct Maths : piko::Pipe<State> {

@@ -23,7 +23,8 @@ FUNCTIONS = {
 }
 CXX = ["g++", "-std=c++20", "-O2", "-march=native", "-ffp-contract=off"]
 # What the program prints, and the columns.
-CONTENDERS = {"scalar": "Piko", "vectors": "Piko, vectors", "libm": "libm",
+CONTENDERS = {"scalar": "Piko", "vectors": "Piko, vectors",
+              "near1": "within 1 ULP", "near4": "within 4 ULP", "libm": "libm",
               "sleef": "SLEEF", "sleef-vectors": "SLEEF, vectors"}
 
 
@@ -38,11 +39,15 @@ def build(options, function, sleef):
     low, high = FUNCTIONS[function]
     program = f"{options.work}/maths.{function}"
     objects, headers = [], []
-    for space, build_name in [("scalar", "scalar"), ("vectors", "default")]:
+    for space, build_name, flags in [
+            ("scalar", "scalar", []), ("vectors", "default", []),
+            ("near1", "default", ["-DMATHS_ULPS=1"]),
+            ("near4", "default", ["-DMATHS_ULPS=4"])]:
         code, header = f"{program}.{space}.o", f"{program}.{space}.h"
         call([f"{options.bin}/pikoc", f"{FOLDER}/maths.piko.cpp", "-o", code,
               "--header", header, "--cpu=native", "--namespace", space,
-              f"-DMATHS_FUNCTION={function}", *bodies.COMPILED[build_name]])
+              f"-DMATHS_FUNCTION={function}", *flags,
+              *bodies.COMPILED[build_name]])
         objects.append(code)
         headers.append(f'-DMATHS_{space.upper()}="{header}"')
     call([*CXX, f"-I{ROOT}/runtime/include", *headers,

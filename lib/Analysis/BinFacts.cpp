@@ -3,6 +3,7 @@
 
 #include "Piko/Analysis/BinIdentity.h"
 #include "Piko/Analysis/LinearFacts.h"
+#include "Piko/Dialect/Piko/IR/PikoFixed.h"
 
 using namespace mlir;
 using namespace piko;
@@ -27,13 +28,24 @@ Linear BinFacts::addSize() {
   return size;
 }
 
+/// How many elements a buffer was fixed to have.
+static std::optional<int64_t> getFixedSize(PipelineOp pipeline,
+                                           StringRef state) {
+  for (auto fixed : pipeline.getOps<FixedOp>())
+    if (fixed.getState() == state && !fixed.getField())
+      return cast<IntegerAttr>(fixed.getValue()).getInt();
+  return std::nullopt;
+}
+
 Linear BinFacts::getExtent(StringRef state, int64_t dim) {
   Operation *op = SymbolTable::lookupSymbolIn(core.pipeline, state);
   if (isa_and_nonnull<ImageOp>(op))
     return getDomain(dim);
   auto [found, isNew] = extents.try_emplace({state.str(), dim});
-  if (isNew)
-    found->second = addSize();
+  if (isNew) {
+    std::optional<int64_t> size = getFixedSize(core.pipeline, state);
+    found->second = size ? Linear(*size) : addSize();
+  }
   return found->second;
 }
 

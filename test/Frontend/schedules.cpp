@@ -14,13 +14,14 @@ struct State {
 // A tile split on another kind is accepted, and has no effect.
 // CHECK-LABEL: piko.stage @fixed
 // CHECK: piko.schedule serialize batch 16 lanes one{{$}}
-// CHECK-NEXT: piko.process precision relaxed {
+// CHECK-NEXT: piko.process precision relaxed ulps 2 {
 struct Fixed : piko::Stage<0, 0, 64, int, int> {
   void schedule(piko::BinId) {
     specifySchedule(piko::Serialize, 3);
     batch(16);
     specifyLanes(piko::Lanes::One);
     specifyPrecision(piko::Precision::Relaxed);
+    specifyUlps(2);
   }
   void process(const piko::List<int> &list) { emit(list[0]); }
 };

@@ -37,7 +37,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
           "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
           "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
-          "thread-jumps", "narrow-integers", "distribute-loops", "reduce-strength",
+          "thread-jumps", "narrow-integers", "distribute-loops", "reduce-strength", "peel-vectors",
           "merge-gathers", "pair-gathers",
           "unswitch-versions", "privatize", "reduce-updates", "if-convert"]
 

@@ -304,6 +304,44 @@ def ReduceStrength : Pass<"piko-reduce-strength", "::piko::PipelineOp"> {
                         "Lanes of a vector: 4, 8 or 16 (default: 16)">];
 }
 
+def PeelVectors : Pass<"piko-peel-vectors", "::piko::PipelineOp"> {
+  let summary = "Peel off the last vector of a loop, which need not be full";
+  let description = [{
+    **Requires** lanes (`piko-vectorize`), whose masks have the mark `piko.last_lanes`.
+
+    **Does**: loop peeling. A loop over rows, of at most so many lanes, becomes one over
+    full vectors, without a mask, and one vector with it. Loads and stores of AVX2 that
+    have a mask take several times as long as those without.
+
+    **Guarantees** the same operations in the same order.
+
+    Before:
+    ```
+    scf.for %i = %lo to %hi step %c8 {
+      ...
+      %mask = arith.cmpi slt, %lanes, %left {piko.last_lanes} : vector<8xi32>
+      ... mask %mask ...
+    }
+    ```
+    After:
+    ```
+    %end = ...               // %lo, and a multiple of 8
+    scf.for %i = %lo to %end step %c8 {
+      ... mask %all ...
+    }
+    %more = arith.cmpi slt, %end, %hi : index
+    scf.if %more {
+      ... mask %mask ...
+    }
+    ```
+
+    **Limits**: loops that load or store rows, of at most 400 operations.
+  }];
+  let dependentDialects = ["::mlir::arith::ArithDialect", "::mlir::scf::SCFDialect"];
+  let options = [Option<"mostLanes", "most-lanes", "int64_t", "8",
+                        "Of vectors with more the processor has cheap masks">];
+}
+
 def MergeGathers : Pass<"piko-merge-gathers", "::piko::PipelineOp"> {
   let summary = "Read fields of a record for all lanes at once";
   let description = [{

@@ -38,6 +38,7 @@ struct Trace {
   llvm::StringSet<> passes;      ///< that have run
   /// Of stages that need not be strict, by name.
   llvm::StringMap<Precision> precisions;
+  llvm::StringMap<int64_t> ulps;
 
   void add(Diagnostic &remark);
 };
@@ -56,10 +57,13 @@ struct Tracer : PassInstrumentation {
       trace.ordered = op->getParentOfType<ModuleOp>().clone();
   }
   void notePrecisions(PipelineOp pipeline) {
-    for (auto stage : pipeline.getOps<StageOp>())
-      if (ProcessOp process = stage.getProcess();
-          process && process.getPrecision())
+    for (auto stage : pipeline.getOps<StageOp>()) {
+      ProcessOp process = stage.getProcess();
+      if (process && process.getPrecision())
         trace.precisions[stage.getSymName()] = *process.getPrecision();
+      if (process && process.getUlps())
+        trace.ulps[stage.getSymName()] = int64_t(*process.getUlps());
+    }
   }
   Trace &trace;
 };
@@ -280,6 +284,8 @@ void Report::writeStage(StageOp stage) {
   if (auto said = trace.precisions.find(stage.getSymName());
       said != trace.precisions.end())
     out << ", " << stringifyPrecision(said->second) << " precision";
+  if (auto said = trace.ulps.find(stage.getSymName()); said != trace.ulps.end())
+    out << ", functions within " << said->second << " ULP";
   if (isOnCycle(stage))
     out << ", on a cycle";
   if (!hosts.contains(stage.getSymName())) {

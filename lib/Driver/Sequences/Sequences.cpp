@@ -236,6 +236,10 @@ void piko::addVectorSequence(OpPassManager &passes,
   }
   if (options.count == Counting::Lanes)
     passes.nest<PipelineOp>().addPass(createCountLanes());
+  if (options.has("vectorize") && options.has("peel-vectors")) {
+    passes.nest<PipelineOp>().addPass(createPeelVectors());
+    addCleanUp(passes);
+  }
   if (options.has("unswitch-versions"))
     passes.nest<PipelineOp>().addPass(createUnswitchVersions());
   passes.nest<PipelineOp>().addPass(createConvertPikoToOpenMP());

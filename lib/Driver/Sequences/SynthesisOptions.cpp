@@ -19,8 +19,8 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
       "lockstep", "flatten-nests", "compact-loops", "prove-bounds",
       "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
-      "narrow-integers", "distribute-loops", "reduce-strength", "merge-gathers",
-      "pair-gathers", "tabulate-invariants", "unroll-and-jam",
+      "narrow-integers", "distribute-loops", "reduce-strength", "peel-vectors",
+      "merge-gathers", "pair-gathers", "tabulate-invariants", "unroll-and-jam",
       "unswitch-versions", "if-convert", "uplift-pixel-loops", "privatize",
       "reduce-updates", "reduce-by-atomics",
       // of a GPU

@@ -38,6 +38,10 @@ LogicalResult PhaseImporter::importMarker(llvm::CallInst *call,
   case MarkerKind::binHi:
   case MarkerKind::domain:
     return importQuery(call, marker);
+  case MarkerKind::allowsUlps:
+    values[call] =
+        make<AllowsUlpsOp>(builder.getI1Type(), getConstant(call, 0));
+    return success();
   case MarkerKind::sync:
     if (failed(checkBarrier(call, "sync")))
       return failure();

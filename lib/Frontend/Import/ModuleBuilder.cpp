@@ -185,8 +185,9 @@ private:
     }
     if (!buildSchedule(number))
       return false;
-    auto process = ProcessOp::create(builder, *stage.processLocation, nullptr,
-                                     /*precision=*/nullptr);
+    auto process =
+        ProcessOp::create(builder, *stage.processLocation, /*stage=*/nullptr,
+                          /*precision=*/nullptr, /*ulps=*/nullptr);
     setAttributes(process, stage.schedule.ofProcess);
     return buildPhase(WrapperKind::Process, number, process.getBody());
   }

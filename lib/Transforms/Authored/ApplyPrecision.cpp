@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// piko-apply-precision: for each process phase that need not be strict,
-//   1. of divisions and square roots in f32, make approximations; piko::rsqrt,
-//      which computes in f64, is recognised. The reciprocal of a constant is
-//      the nearest number, unless that has fewer bits;
+// piko-apply-precision: for each process phase, choose functions that are as
+// far from the exact result as it allows. If it need not be strict,
+//   1. of divisions and square roots in f32, make approximations. The
+//   reciprocal
+//      of a constant is the nearest number, unless that has fewer bits;
 //   2. make additions of products math.fma, whether or not a product is used
 //      elsewhere, and also if both sides of a condition yield one. Of two
 //      products the left one is fused.
@@ -19,6 +20,7 @@
 #include "mlir/IR/Matchers.h"
 #include "mlir/IR/TypeUtilities.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "mlir/Transforms/GreedyPatternRewriteDriver.h"
 
 namespace piko {
 #define GEN_PASS_DEF_APPLYPRECISION
@@ -48,20 +50,6 @@ static Value getRooted(Value value) {
   return root ? root.getOperand() : Value();
 }
 
-/// x where a number is piko::rsqrt(x), which divides and extracts in f64; or
-/// null.
-static Value getWideRsqrt(Operation *op) {
-  auto narrow = dyn_cast<arith::TruncFOp>(op);
-  if (!narrow || !narrow.getType().isF32())
-    return {};
-  auto division = narrow.getIn().getDefiningOp<arith::DivFOp>();
-  Value rooted = division && isOne(division.getLhs())
-                     ? getRooted(division.getRhs())
-                     : Value();
-  auto wide = rooted ? rooted.getDefiningOp<arith::ExtFOp>() : arith::ExtFOp();
-  return wide && wide.getIn().getType().isF32() ? wide.getIn() : Value();
-}
-
 static Value replaceDivision(ImplicitLocOpBuilder &builder, Value dividend,
                              Value divisor) {
   Value inverse;
@@ -87,8 +75,6 @@ static Value replaceDivision(ImplicitLocOpBuilder &builder, Value dividend,
 /// What replaces a division or a square root in f32, or null.
 static Value approximate(Operation *op) {
   ImplicitLocOpBuilder builder(op->getLoc(), op);
-  if (Value x = getWideRsqrt(op))
-    return ApproximateRsqrtOp::create(builder, x);
   if (op->getNumResults() != 1 || !op->getResult(0).getType().isF32())
     return {};
   if (auto division = dyn_cast<arith::DivFOp>(op))
@@ -236,7 +222,45 @@ static void contract(ProcessOp process, Counts &counts) {
   }
 }
 
+/// Answers what asks how far functions may be from the exact result, and takes
+/// the branches that follow.
+static void chooseFunctions(Operation *phase, int64_t ulps) {
+  SmallVector<Operation *> choices;
+  auto ask = [&](AllowsUlpsOp op) {
+    OpBuilder builder(op);
+    for (Operation *user : op->getUsers())
+      choices.push_back(user);
+    op.replaceAllUsesWith(
+        arith::ConstantIntOp::create(builder, op.getLoc(),
+                                     int64_t(op.getUlps()) <= ulps, /*width=*/1)
+            .getResult());
+    op.erase();
+  };
+  phase->walk(ask);
+  if (choices.empty())
+    return;
+  RewritePatternSet patterns(phase->getContext());
+  scf::IfOp::getCanonicalizationPatterns(patterns, phase->getContext());
+  arith::SelectOp::getCanonicalizationPatterns(patterns, phase->getContext());
+  (void)applyPatternsGreedily(phase, std::move(patterns));
+}
+
+static int64_t getAllowedUlps(ProcessOp process) {
+  // Of a float; what Precision::Relaxed does to divisions is about as much.
+  constexpr int64_t relaxed = 4;
+  if (std::optional<uint64_t> ulps = process.getUlps())
+    return int64_t(*ulps);
+  return process.getPrecision() == Precision::Relaxed ? relaxed : 0;
+}
+
 void ApplyPrecisionPass::runOnOperation() {
+  for (auto stage : getOperation().getOps<StageOp>())
+    for (Operation &phase : *stage.getBodyBlock()) {
+      auto process = dyn_cast<ProcessOp>(phase);
+      chooseFunctions(&phase, process ? getAllowedUlps(process) : 0);
+      if (process)
+        process.removeUlpsAttr();
+    }
   for (auto stage : getOperation().getOps<StageOp>()) {
     ProcessOp process = stage.getProcess();
     if (!process || !process.getPrecision())

@@ -138,13 +138,22 @@ static LogicalResult setPrecision(StageOp stage, const Directive &directive) {
   return success();
 }
 
+static LogicalResult setUlps(StageOp stage, const Directive &directive) {
+  int64_t ulps = 0;
+  if (!llvm::to_integer(directive.value, ulps, 10) || ulps < 1)
+    return refuseValue(stage, directive, "a number of units, at least 1");
+  stage.getProcess().setUlps(ulps);
+  return success();
+}
+
 static LogicalResult set(StageOp stage, const Directive &directive) {
   using Set = LogicalResult (*)(StageOp, const Directive &);
   static constexpr std::pair<StringLiteral, Set> keys[] = {
       {"schedule", setSchedule},
       {"split", setSplit},
       {"lanes", setLanes},
-      {"precision", setPrecision}};
+      {"precision", setPrecision},
+      {"ulps", setUlps}};
   std::string expected;
   for (const auto &[key, set] : keys) {
     if (directive.key == key)

@@ -230,6 +230,13 @@ public:
                         detail::Place at = detail::Place::current()) {
     PIKO_SAY(precision, static_cast<int32_t>(precision));
   }
+  /// How far functions such as piko::exp may be from the exact result in a
+  /// compiled Process, in units in the last place (ULP) of a float, at least 1;
+  /// cheaper ones are taken then. By default, all are within 0.501, and in
+  /// Precision::Relaxed within 4.
+  void specifyUlps(int64_t ulps, detail::Place at = detail::Place::current()) {
+    PIKO_SAY(ulps, ulps);
+  }
   /// What reports, traces and messages call the stage, and no other one.
   void specifyName(const char *name,
                    detail::Place at = detail::Place::current()) {

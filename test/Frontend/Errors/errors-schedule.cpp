@@ -17,6 +17,7 @@
 // RUN: not piko-translate --cpp-to-piko -DCASE=15 %s 2>&1 | FileCheck %s --check-prefix=PRECISION
 // RUN: not piko-translate --cpp-to-piko -DCASE=16 %s 2>&1 | FileCheck %s --check-prefix=PRECISION-VARIABLE
 // RUN: not piko-translate --cpp-to-piko -DCASE=17 %s 2>&1 | FileCheck %s --check-prefix=PRECISION-RANGE
+// RUN: not piko-translate --cpp-to-piko -DCASE=18 %s 2>&1 | FileCheck %s --check-prefix=ULPS
 #include <piko.h>
 
 struct State {
@@ -70,6 +71,9 @@ struct One : piko::Stage<8, 8, 64, int, int>, piko::Uses<State> {
 #elif CASE == 17
     // PRECISION-RANGE: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected a value of piko::Precision, but got 3
     specifyPrecision(static_cast<piko::Precision>(3));
+#elif CASE == 18
+    // ULPS: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected a specifyUlps of at least 1, but got 0
+    specifyUlps(0);
 #endif
   }
   void process(const int &i) {

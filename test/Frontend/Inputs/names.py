@@ -17,7 +17,8 @@ STAGE = """
     assignBin assignToAll assignToBin assignToBoundingBox assignToLine
     assignToPreviousBins
     schedule specifySchedule endStage endBin batch everyBin specifyOrder
-    specifyLanes specifyPrecision specifyName process emit update parallelFor parallelForPixels sync any all count reduce
+    specifyLanes specifyPrecision specifyUlps specifyName process emit update
+    parallelFor parallelForPixels sync any all count reduce
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage
     Uses"""
 PIPE = """
@@ -31,7 +32,7 @@ NAMESPACE = """
     atomicMax atomicMin atomicOr atomicXor cbrt cos cosh exp exp2 fma hypot log
     log10 log2 max min pow rsqrt sin sinh sqrt tan tanh toInt toInt64 toUint tunable"""
 # Of namespaces, which are no names for functions; piko.h needs the others.
-SPACES = "piko std glm user detail marker reference"
+SPACES = "piko std glm user detail marker reference within"
 # What other headers declare globally as no function.
 OTHERS = """
     FPE_INTDIV FP_CONTRACT INT32_MAX INT32_MIN INT64_MAX INT64_MIN UINT32_MAX

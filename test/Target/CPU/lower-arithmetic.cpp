@@ -47,7 +47,7 @@ struct Divide : piko::Stage<0, 0, 1, int>, piko::Uses<State> {
     for (int i = 0; i < 64; ++i)
       x[i] = state().a[first + i];
     for (int i = 0; i < 64; ++i)
-      y[i] = x[i] * x[i] + x[i] / (1.0f + piko::rsqrt(x[i]));
+      y[i] = x[i] * x[i] + x[i] / (1.0f + 1.0f / piko::sqrt(x[i]));
     for (int i = 0; i < 64; ++i)
       state().b[first + i] = y[i];
   }

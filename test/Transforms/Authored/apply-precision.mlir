@@ -185,7 +185,7 @@ piko.pipeline @Quotient rank 1 {
 }
 
 // All ways of writing an inverse square root are one approximation: 1 / sqrt(x),
-// where sqrt(x) is used, too; a / sqrt(x); and what piko::rsqrt computes.
+// where sqrt(x) is used, too; and a / sqrt(x).
 // CHECK-LABEL: piko.pipeline @Roots
 // CHECK-DAG:     %[[X:.*]] = piko.get %{{.*}} "a"
 // CHECK-DAG:     %[[Y:.*]] = piko.get %{{.*}} "b"
@@ -195,34 +195,26 @@ piko.pipeline @Quotient rank 1 {
 // CHECK:         %[[INVERSE:.*]] = piko.approximate_rsqrt %[[X]] : f32
 // CHECK:         %[[FACTOR:.*]] = piko.approximate_rsqrt %[[X]] : f32
 // CHECK:         %[[SCALED:.*]] = arith.mulf %[[Y]], %[[FACTOR]]
-// CHECK:         %[[RSQRT:.*]] = piko.approximate_rsqrt %[[X]] : f32
 // CHECK:         piko.store %[[ROOT]], @out
 // CHECK-NEXT:    piko.store %[[INVERSE]], @out
 // CHECK-NEXT:    piko.store %[[SCALED]], @out
-// CHECK-NEXT:    piko.store %[[RSQRT]], @out
 piko.pipeline @Roots rank 1 {
   piko.buffer @out : @F
   piko.source @s
   piko.stage @s bins [0] threads 1 : @F -> [] {
-    // expected-remark @below {{stage 's' is relaxed: 0 additions are contracted, 2 divisions and 2 square roots approximated}}
+    // expected-remark @below {{stage 's' is relaxed: 0 additions are contracted, 2 divisions and 1 square roots approximated}}
     piko.process precision relaxed {
     ^bb0(%f: !piko.prim<@F>):
       %i = arith.constant 0 : index
       %one = arith.constant 1.0 : f32
-      %wideOne = arith.constant 1.0 : f64
       %x = piko.get %f "a" : !piko.prim<@F> -> f32
       %y = piko.get %f "b" : !piko.prim<@F> -> f32
       %root = math.sqrt %x : f32
       %inverse = arith.divf %one, %root : f32
       %scaled = arith.divf %y, %root : f32
-      %wide = arith.extf %x : f32 to f64
-      %wideRoot = math.sqrt %wide : f64
-      %wideInverse = arith.divf %wideOne, %wideRoot : f64
-      %rsqrt = arith.truncf %wideInverse : f64 to f32
       piko.store %root, @out[%i : index] "a" : f32
       piko.store %inverse, @out[%i : index] "a" : f32
       piko.store %scaled, @out[%i : index] "a" : f32
-      piko.store %rsqrt, @out[%i : index] "a" : f32
       piko.return
     }
   }
@@ -259,6 +251,90 @@ piko.pipeline @Sides rank 1 {
       %other = arith.addf %sides#1, %b : f32
       piko.store %sum, @out[%i : index] "a" : f32
       piko.store %other, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+}
+
+// Functions are chosen by what a phase allows: nothing, so much as it says, or 4 where
+// it is relaxed. A branch that is not taken is gone.
+// CHECK-LABEL: piko.pipeline @Functions
+piko.pipeline @Functions rank 1 {
+  piko.buffer @out : @F
+  piko.source @exact
+  piko.source @one
+  piko.source @loose
+  piko.source @tight
+  // CHECK:      piko.stage @exact
+  // CHECK:        piko.process {
+  // CHECK-NOT:    scf.if
+  // CHECK:        arith.addf
+  // CHECK-NOT:    arith.mulf
+  piko.stage @exact bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %near = piko.allows_ulps 1
+      %r = scf.if %near -> f32 {
+        %m = arith.mulf %a, %a : f32
+        scf.yield %m : f32
+      } else {
+        %m = arith.addf %a, %a : f32
+        scf.yield %m : f32
+      }
+      piko.store %r, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+  // CHECK:      piko.stage @one
+  // CHECK:        piko.process {
+  // CHECK:        arith.divf
+  piko.stage @one bins [0] threads 1 : @F -> [] {
+    piko.process ulps 1 {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %cheap = piko.allows_ulps 4
+      %near = piko.allows_ulps 1
+      %d = arith.divf %a, %a : f32
+      %n = arith.select %near, %d, %a : f32
+      %r = arith.select %cheap, %a, %n : f32
+      piko.store %r, @out[%i : index] "a" : f32
+      piko.return
+    }
+  }
+  // CHECK:      piko.stage @loose
+  // CHECK:        piko.store %{{.*}}, @out
+  // CHECK-NOT:    arith.constant true
+  piko.stage @loose bins [0] threads 1 : @F -> [] {
+    // expected-remark @below {{stage 'loose' is relaxed: 0 additions are contracted, 0 divisions}}
+    piko.process precision relaxed {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %cheap = piko.allows_ulps 4
+      scf.if %cheap {
+        piko.store %a, @out[%i : index] "a" : f32
+      } else {
+        %d = arith.divf %a, %a : f32
+        piko.store %d, @out[%i : index] "a" : f32
+      }
+      piko.return
+    }
+  }
+  // CHECK:      piko.stage @tight
+  // CHECK-NOT:    piko.store
+  piko.stage @tight bins [0] threads 1 : @F -> [] {
+    // expected-remark @below {{stage 'tight' is relaxed}}
+    piko.process precision relaxed ulps 1 {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %a = piko.get %f "a" : !piko.prim<@F> -> f32
+      %cheap = piko.allows_ulps 4
+      scf.if %cheap {
+        piko.store %a, @out[%i : index] "a" : f32
+      }
       piko.return
     }
   }

@@ -243,3 +243,36 @@ piko.pipeline @Refused rank 1 {
     }
   }
 }
+
+// What a size was fixed to: masks, shifts, remainders and clamps are below it.
+// CHECK-LABEL: piko.pipeline @Fixed
+piko.pipeline @Fixed rank 1 {
+  piko.buffer @table : @N
+  piko.fixed @table = 512 : index
+  piko.source @look
+  piko.stage @look bins [0] threads 64 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %mask = arith.constant 511 : i32
+      %wide = arith.constant 1023 : i32
+      %zero = arith.constant 0 : i32
+      %size = arith.constant 512 : i32
+      %by = arith.constant 23 : i32
+      // CHECK-COUNT-4: piko.load checked @table
+      %low = arith.andi %x, %mask : i32
+      %a = piko.load @table[%low : i32] "v" : f32
+      %high = arith.shrui %x, %by : i32
+      %b = piko.load @table[%high : i32] "v" : f32
+      %rest = arith.remui %x, %size : i32
+      %c = piko.load @table[%rest : i32] "v" : f32
+      %least = arith.maxsi %x, %zero : i32
+      %most = arith.minsi %least, %mask : i32
+      %d = piko.load @table[%most : i32] "v" : f32
+      %more = arith.andi %x, %wide : i32
+      // expected-remark @below {{the index of 'table' is tested}}
+      %e = piko.load @table[%more : i32] "v" : f32
+      piko.return
+    }
+  }
+}

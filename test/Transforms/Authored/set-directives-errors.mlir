@@ -10,7 +10,7 @@
 // RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=a:precision=fast}))' %s 2>&1 | FileCheck %s --check-prefix=PRECISION
 // PRECISION: error: piko-set-directives: cannot set precision of stage 'a' to 'fast': expected strict, contracted or relaxed
 // RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=a:unordered=true}))' %s 2>&1 | FileCheck %s --check-prefix=RESULTS
-// RESULTS: error: piko-set-directives: cannot set unordered of stage 'a' to 'true': expected schedule, split, lanes or precision, because others may change results
+// RESULTS: error: piko-set-directives: cannot set unordered of stage 'a' to 'true': expected schedule, split, lanes, precision or ulps, because others may change results
 // RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=a:split=0}))' %s 2>&1 | FileCheck %s --check-prefix=SPLIT
 // SPLIT: error: piko-set-directives: cannot set split of stage 'a' to '0': expected a number of primitives
 // RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=a:split=8}))' %s 2>&1 | FileCheck %s --check-prefix=ALL
@@ -48,3 +48,5 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+// RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=a:ulps=none}))' %s 2>&1 | FileCheck %s --check-prefix=ULPS
+// ULPS: error: piko-set-directives: cannot set ulps of stage 'a' to 'none': expected a number of units, at least 1

@@ -1,4 +1,4 @@
-// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=plain:schedule=direct_map,plain:lanes=one,waits:schedule=all,waits:split=256,waits:precision=relaxed,all:schedule=serialize,says:schedule=none,says:precision=strict,lanes:lanes=none}))' %s | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-set-directives{set=plain:schedule=direct_map,plain:lanes=one,waits:schedule=all,waits:split=256,waits:precision=relaxed,waits:ulps=2,all:schedule=serialize,says:schedule=none,says:precision=strict,lanes:lanes=none}))' %s | FileCheck %s
 
 piko.record @F {"x" : i32 at 0} size 4 align 4
 
@@ -22,7 +22,7 @@ piko.pipeline @P rank 1 {
   // What it waits for stays.
   // CHECK: piko.stage @waits
   // CHECK-NEXT: piko.schedule all tile_split 256 end_stage [@plain] unordered
-  // CHECK-NEXT: piko.process precision relaxed {
+  // CHECK-NEXT: piko.process precision relaxed ulps 2 {
   piko.stage @waits bins [0] threads 64 : @F -> [] {
     piko.schedule load_balance end_stage [@plain] unordered
     piko.process {

@@ -108,8 +108,9 @@ static bool isStrict(ModuleOp module) {
               .walk([](ProcessOp process) {
                 Precision precision =
                     process.getPrecision().value_or(Precision::Strict);
-                return precision == Precision::Strict ? WalkResult::advance()
-                                                      : WalkResult::interrupt();
+                return precision == Precision::Strict && !process.getUlps()
+                           ? WalkResult::advance()
+                           : WalkResult::interrupt();
               })
               .wasInterrupted();
 }

@@ -80,13 +80,14 @@ void PikoDialect::initialize() {
 /// What an attribute of that name has to be; null where there is none.
 static StringRef getExpectedKind(StringRef name) {
   return llvm::StringSwitch<StringRef>(name)
-      .Cases({marks::lanes,         marks::rows,         marks::shared,
-              marks::disjoint,      marks::again,        marks::reordered,
-              marks::rare,          marks::fails,        marks::input,
-              marks::shortCircuit,  marks::inside,       marks::source,
-              marks::versions,      marks::turns,        marks::barriers,
-              marks::ordered,       marks::threaded,     marks::rest,
-              marks::blockCounters, marks::blockBuffers, marks::blockValues},
+      .Cases({marks::lanes,        marks::rows,          marks::shared,
+              marks::disjoint,     marks::again,         marks::reordered,
+              marks::rare,         marks::fails,         marks::input,
+              marks::shortCircuit, marks::inside,        marks::source,
+              marks::versions,     marks::turns,         marks::barriers,
+              marks::lastLanes,    marks::ordered,       marks::threaded,
+              marks::rest,         marks::blockCounters, marks::blockBuffers,
+              marks::blockValues},
              "a unit")
       .Case(marks::mapping, "what lanes are given, as #piko<lanes items>")
       .Case(marks::units, "how threads share units, as #piko<units shared>")

@@ -435,6 +435,7 @@ void IterationWriter::write(OpBuilder::InsertPoint place) {
   vectors.map(loop.getInductionVar(),
               arith::AddIOp::create(builder, loc, splat(first), steps));
   active = writeActive(arith::SubIOp::create(builder, loc, upper, first));
+  active.getDefiningOp()->setAttr(marks::lastLanes, builder.getUnitAttr());
   createMasks();
   writeBlock(*loop.getBody());
   writeLate();

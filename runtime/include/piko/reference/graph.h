@@ -43,6 +43,7 @@ struct StageSchedule {
   bool endsBin = false;                  ///< endBin
   bool unordered = false;
   Precision precision = Precision::Strict; ///< of compiled code only
+  int64_t ulps = 0;                        ///< likewise; 0: not said
   std::string label;                       ///< specifyName
 
   /// The directive that another one says differently, or null.
@@ -53,6 +54,7 @@ struct StageSchedule {
            : endsBin != other.endsBin     ? "endBin"
            : unordered != other.unordered ? "specifyOrder"
            : precision != other.precision ? "specifyPrecision"
+           : ulps != other.ulps           ? "specifyUlps"
            : label != other.label         ? "specifyName"
                                           : nullptr;
   }

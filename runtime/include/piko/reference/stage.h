@@ -72,6 +72,14 @@ struct Directives {
         static_cast<Precision>(precision);
   }
 
+  void ulps(int64_t ulps) {
+    CallFrame &call = frameInSchedule("specifyUlps", at);
+    if (ulps < 1)
+      call.node->fail(call.bin,
+                      "expected a specifyUlps of at least 1, but got " +
+                          std::to_string(ulps));
+    call.node->ulps = ulps;
+  }
   void name(const char *text) {
     CallFrame &call = frameInSchedule("specifyName", at);
     std::string &label = call.node->label;

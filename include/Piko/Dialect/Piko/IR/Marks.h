@@ -18,6 +18,8 @@ constexpr llvm::StringLiteral lanes = "piko.lanes";
 constexpr llvm::StringLiteral rows = "piko.rows";
 /// A loop that becomes vectors of so many lanes: a 64-bit integer.
 constexpr llvm::StringLiteral vectorLanes = "piko.vector_lanes";
+/// A mask of the lanes that the last vector of the loop around it has.
+constexpr llvm::StringLiteral lastLanes = "piko.last_lanes";
 /// A loop over the lanes of a vector that take turns.
 constexpr llvm::StringLiteral turns = "piko.turns";
 /// A loop around one whose iterations meet at barriers.

@@ -199,4 +199,19 @@ def Piko_DomainOp : Piko_Op<"domain", [Pure]> {
   let hasVerifier = 1;
 }
 
+def Piko_AllowsUlpsOp : Piko_Op<"allows_ulps", [Pure]> {
+  let summary = "whether functions may be so far from the exact result";
+  let description = [{
+    In units in the last place of a float. A process phase with as many `ulps`, or
+    more, allows it; `piko-apply-precision` knows.
+
+    ```mlir
+    %cheaper = piko.allows_ulps 4
+    ```
+  }];
+  let arguments = (ins ConfinedAttr<Piko_I64Attr, [IntPositive]>:$ulps);
+  let results = (outs I1:$result);
+  let assemblyFormat = "$ulps attr-dict";
+}
+
 #endif // PIKO_DIALECT_PIKO_IR_PIKOBODYOPS_TD

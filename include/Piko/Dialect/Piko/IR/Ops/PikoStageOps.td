@@ -157,7 +157,7 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
 
     A `precision` other than `strict` is a permission that `piko-apply-precision`
     makes use of, and takes away: below, operations say exactly what they
-    compute. Only the authored level has it.
+    compute. So are `ulps`, of functions. Only the authored level has them.
 
     ```mlir
     piko.record @F {"z" : f32 at 0} size 4 align 4
@@ -184,10 +184,11 @@ def Piko_ProcessOp : Piko_PhaseOp<"process"> {
     ```
   }];
   let arguments = (ins OptionalAttr<FlatSymbolRefAttr>:$stage,
-                       OptionalAttr<Piko_PrecisionAttr>:$precision);
+                       OptionalAttr<Piko_PrecisionAttr>:$precision,
+      OptionalAttr<ConfinedAttr<Piko_I64Attr, [IntPositive]>>:$ulps);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    (`of` $stage^)? (`precision` $precision^)?
+    (`of` $stage^)? (`precision` $precision^)? (`ulps` $ulps^)?
     attr-dict-with-keyword custom<PhaseBody>($body)
   }];
   let hasRegionVerifier = 1;
