@@ -390,7 +390,8 @@ inline float log(float x) {
 }
 /// The logarithm to base 2. Within 0.501 ULP.
 inline float log2(float x) {
-  PIKO_WITHIN(log2)
+  if (detail::allowsUlps(4))
+    return within::log2<4>(x);
   if (!(x > 0.0f && x < detail::infinity()))
     return detail::logOutside(x);
   detail::Logarithm l = detail::logOf(x);

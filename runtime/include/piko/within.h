@@ -98,7 +98,10 @@ template <int Ulps> inline float log(float x) {
   float rest = fma(l.exponent, -0x1.05c61p-29f, l.rest);
   return fma(l.exponent, 0x1.62e43p-1f, l.f + rest);
 }
-template <int Ulps> inline float log2(float x) {
+/// Within 4 ULP: in floats, the product with log2(e) leaves no room for 1.
+template <int Ulps>
+  requires(Ulps >= 4)
+inline float log2(float x) {
   if (!isFinite(x))
     return detail::logOutside(x);
   Logarithm l = logOf<Ulps>(x);
