@@ -98,8 +98,13 @@ Error piko::inlineRuntimeCode(Module &module, RuntimeCode kind) {
   SmallVector<std::string> names;
   for (Function &function : **library) {
     const Function *declared = module.getFunction(function.getName());
-    if (!function.isDeclaration() && declared && declared->isDeclaration())
-      names.push_back(function.getName().str());
+    if (function.isDeclaration() || !declared || !declared->isDeclaration())
+      continue;
+    if (declared->getFunctionType() != function.getFunctionType())
+      return createStringError("expected the arguments and the result of '" +
+                               function.getName() +
+                               "' as the runtime's header has them");
+    names.push_back(function.getName().str());
   }
   if (names.empty())
     return isCPU ? Error::success() : checkKernels(module);

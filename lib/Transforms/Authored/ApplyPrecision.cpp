@@ -3,8 +3,8 @@
 // piko-apply-precision: for each process phase, choose functions that are as
 // far from the exact result as it allows. If it need not be strict,
 //   1. of divisions and square roots in f32, make approximations. The
-//   reciprocal
-//      of a constant is the nearest number, unless that has fewer bits;
+//      reciprocal of a constant is the nearest number, unless that has fewer
+//      bits;
 //   2. make additions of products math.fma, whether or not a product is used
 //      elsewhere, and also if both sides of a condition yield one. Of two
 //      products the left one is fused.
@@ -225,19 +225,17 @@ static void contract(ProcessOp process, Counts &counts) {
 /// Answers what asks how far functions may be from the exact result, and takes
 /// the branches that follow.
 static void chooseFunctions(Operation *phase, int64_t ulps) {
-  SmallVector<Operation *> choices;
-  auto ask = [&](AllowsUlpsOp op) {
+  bool asks = false;
+  phase->walk([&](AllowsUlpsOp op) {
+    asks = true;
     OpBuilder builder(op);
-    for (Operation *user : op->getUsers())
-      choices.push_back(user);
     op.replaceAllUsesWith(
         arith::ConstantIntOp::create(builder, op.getLoc(),
                                      int64_t(op.getUlps()) <= ulps, /*width=*/1)
             .getResult());
     op.erase();
-  };
-  phase->walk(ask);
-  if (choices.empty())
+  });
+  if (!asks)
     return;
   RewritePatternSet patterns(phase->getContext());
   scf::IfOp::getCanonicalizationPatterns(patterns, phase->getContext());

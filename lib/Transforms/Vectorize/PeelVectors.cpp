@@ -64,10 +64,12 @@ static Value createFullEnd(OpBuilder &builder, scf::ForOp loop, int64_t lanes) {
     return arith::ConstantOp::create(builder, loc,
                                      builder.getIntegerAttr(type, value));
   };
-  Value first = loop.getLowerBound();
-  Value count =
-      arith::SubIOp::create(builder, loc, loop.getUpperBound(), first);
-  count = arith::MaxSIOp::create(builder, loc, count, constant(0));
+  Value first = loop.getLowerBound(), end = loop.getUpperBound();
+  // How many there are may be more than is positive.
+  Value isAny = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt,
+                                      first, end);
+  Value count = arith::SubIOp::create(builder, loc, end, first);
+  count = arith::SelectOp::create(builder, loc, isAny, count, constant(0));
   Value full = arith::AndIOp::create(builder, loc, count, constant(-lanes));
   return arith::AddIOp::create(builder, loc, first, full);
 }
@@ -103,7 +105,8 @@ void PeelVectorsPass::runOnOperation() {
     if (op->hasAttr(marks::lastLanes))
       masks.push_back(op);
   });
-  for (arith::CmpIOp mask : masks) {
+  // Inner loops first: copies have them as they are then.
+  for (arith::CmpIOp mask : llvm::reverse(masks)) {
     mask->removeAttr(marks::lastLanes);
     if (scf::ForOp loop = getLoop(mask, mostLanes); loop && pays(loop))
       peel(loop, mask);

@@ -76,7 +76,7 @@ enum class Lanes : int32_t {
 enum class Precision : int32_t {
   Strict = 0,     ///< to the bit as the reference executor does
   Contracted = 1, ///< a * b + c may be rounded once
-  Relaxed = 2,    ///< and division and square root may be approximations
+  Relaxed = 2,    ///< and divisions, roots and functions may be approximations
 };
 
 /// The primitives of one bin, or one batch of them, in order.

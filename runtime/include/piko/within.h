@@ -1,10 +1,10 @@
-//===- piko/within.h - Functions in floats, within a few units
-//-------------===//
+//===- piko/within.h - Functions in floats, within a few units ------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What piko/math.h computes in double, in float: twice as many lanes, and with
-// less work. Each is within 1 or 4 units in the last place (ULP), its template
-// argument, of the exact result; the bound holds for all arguments, and
+// A part of piko/math.h, which includes it after what it needs. What that
+// computes in double, in float: twice as many lanes, and less work. Each is
+// within 1 or 4 units in the last place (ULP), its template argument, of the
+// exact result; the bound holds for all arguments, and
 // unittests/Language/MathBoundTest.cpp verifies it. Only stages that allow so
 // much have them (specifyUlps). The same bits everywhere, as all products that
 // are added are piko::fma.

@@ -1,6 +1,7 @@
 // RUN: split-file %s %t
 // RUN: pikoc %t/known.mlir --emit=ptx -o - | FileCheck %s
 // RUN: not pikoc %t/unknown.mlir --emit=ptx -o - 2>&1 | FileCheck %s --check-prefix=UNKNOWN
+// RUN: not pikoc %t/other.mlir --emit=ptx -o - 2>&1 | FileCheck %s --check-prefix=OTHER
 // Kernels have C++ of the runtime inline: nothing is called. A call of what there is not
 // is an error.
 
@@ -31,6 +32,18 @@ piko.pipeline @P rank 1 {}
 gpu.module @kernels {
   gpu.func @kernel(%log: !llvm.ptr) kernel {
     piko.gpu.call "pikoir_grid_none"(%log) : (!llvm.ptr) -> ()
+    gpu.return
+  }
+}
+
+// OTHER: other.mlir:3:1: error: expected the arguments and the result of 'pikoir_grid_rest' as the runtime's header has them
+
+//--- other.mlir
+piko.pipeline @P rank 1 {}
+
+gpu.module @kernels {
+  gpu.func @kernel(%log: !llvm.ptr) kernel {
+    piko.gpu.call "pikoir_grid_rest"(%log) : (!llvm.ptr) -> ()
     gpu.return
   }
 }

@@ -7,9 +7,10 @@ piko.record @F {"x" : f32 at 0} size 4 align 4
 // Full vectors, whose mask is constant; then the rest, if there is any.
 // CHECK-LABEL: piko.kernel @row
 // CHECK:         %[[N:.*]] = piko.extent @in[0]
-// CHECK:         %[[COUNT:.*]] = arith.subi %[[N]], %[[LO:.*]] : index
-// CHECK:         %[[ANY:.*]] = arith.maxsi %[[COUNT]], %c0
-// CHECK:         %[[FULL:.*]] = arith.andi %[[ANY]], %c-8
+// CHECK:         %[[ANY:.*]] = arith.cmpi slt, %[[LO:.*]], %[[N]] : index
+// CHECK:         %[[DIFFERENCE:.*]] = arith.subi %[[N]], %[[LO]] : index
+// CHECK:         %[[COUNT:.*]] = arith.select %[[ANY]], %[[DIFFERENCE]], %c0
+// CHECK:         %[[FULL:.*]] = arith.andi %[[COUNT]], %c-8
 // CHECK:         %[[END:.*]] = arith.addi %[[LO]], %[[FULL]]
 // CHECK:         scf.for %[[I:.*]] = %[[LO]] to %[[END]] step %c8
 // CHECK:           %[[ALL:.*]] = arith.constant dense<true> : vector<8xi1>
