@@ -77,6 +77,21 @@ def numbers():
         "Strict", options=("--lights", "100"))
 
 
+def functions():
+    source = f"{CHOICES_FOLDER}/functions.piko.cpp"
+    return Choice(
+        "functions", "Functions of a stage",
+        [Setting(name, source, pipe) for name, pipe in
+         (("0.501 ULP", "ExactFunctions"), ("1 ULP", "FunctionsIn1Ulp"),
+          ("4 ULP", "FunctionsIn4Ulps"), ("Relaxed, 4 ULP", "RelaxedFunctions"))],
+        Setting("0.501 ULP", source, "ExactFunctions"),
+        "functions within 0.501 ULP",
+        "specifyUlps of the stage that shades, in examples/raster's Tiled with a "
+        "highlight of each light (pow), fog (exp) and gamma (pow). In Relaxed "
+        "divisions and square roots are approximated as well.",
+        "0.501 ULP", options=("--lights", "20"))
+
+
 def subpixels():
     source = "examples/visibility/visibility.piko.cpp"
     return Choice(
@@ -281,7 +296,7 @@ def output():
 
 
 CHOICES = {choice.name: choice for choice in
-           (numbers(), samples(), levels_of_detail(), subpixels(), depth(10),
+           (numbers(), functions(), samples(), levels_of_detail(), subpixels(), depth(10),
             depth(10**4, "depth-10k"), depth(10**6, "depth-1m"), rays(),
             shading_rate(), transparency(), shadows(), shadow_map(),
             shadow_bias(), micropolygons(), bound_slack(), output())}

@@ -6,10 +6,12 @@
 #include "Piko/Analysis/Uniformity.h"
 
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/UB/IR/UBOps.h"
+#include "mlir/Dialect/Vector/IR/VectorOps.h"
 
 using namespace mlir;
 using namespace piko;
@@ -216,14 +218,20 @@ bool Uniformity::isInside(Value array) const {
   return made && root->isProperAncestor(made);
 }
 
-/// Whether an array is filled before the root, which only reads it.
+/// Whether an operation accesses arrays, and hands none on.
+static bool accessesArrays(Operation *op) {
+  return isa<memref::LoadOp, memref::StoreOp, vector::LoadOp, vector::StoreOp,
+             vector::MaskedLoadOp, vector::MaskedStoreOp, vector::GatherOp,
+             vector::ScatterOp, vector::CompressStoreOp, PushOp>(op);
+}
+
+/// Whether an array is filled before the root, which only reads it. What filled
+/// it may have become vectors.
 bool Uniformity::isFinished(Value array) const {
   auto made = array.getDefiningOp<memref::AllocaOp>();
   return made && llvm::all_of(made->getUsers(), [&](Operation *user) {
-           auto store = dyn_cast<memref::StoreOp>(user);
            return isa<memref::LoadOp>(user) ||
-                  (store && store.getValue() != array &&
-                   !root->isAncestor(store));
+                  (accessesArrays(user) && !root->isAncestor(user));
          });
 }
 

@@ -28,12 +28,13 @@ FEATURES = [
     "collectives", "gather", "cycles", "unordered", "fetch-atomics", "float-atomics",
     "updates", "atomics", "stores", "maths", "bit-tricks", "float-specials",
     "dynamic-elements", "loop-jumps", "early-returns", "switches", "lambdas",
-    "helpers", "template-stages", "local-arrays", "twin-stages", "chains", "many-inputs",
-    "selections", "shading",
+    "helpers", "template-stages", "local-arrays", "appends", "twin-stages", "chains",
+    "many-inputs", "selections", "shading",
 ]
 #: What the dialect's printer does not write: C++ that the front end removes.
 CPP_ONLY = {"maths", "loop-jumps", "early-returns", "switches", "lambdas", "helpers",
-            "template-stages", "bit-tricks", "dynamic-elements", "local-arrays"}
+            "template-stages", "bit-tricks", "dynamic-elements", "local-arrays",
+            "appends"}
 
 #: What the printer of the dialect does not write yet.
 NOT_IN_TEXT = {"lists", "parallelFor", "gather", "dynamic-schedule", "fetch-atomics",

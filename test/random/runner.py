@@ -26,7 +26,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "unswitch-versions",
           "uplift-pixel-loops", "privatize", "reduce-updates",
           "reduce-by-atomics",
-          "collapse-pixels", "group-updates", "share-by-count", "compact-work",
+          "share-appends", "collapse-pixels", "group-updates", "share-by-count", "compact-work",
           "split-rare"]
 
 

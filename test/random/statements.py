@@ -49,6 +49,8 @@ class Statements(Expressions):
             kinds += ["emit"] * 4 + ["write"] * 3
             if self.on("local-arrays"):
                 kinds.append("array")
+            if self.on("appends") and not scope.loops:
+                kinds += ["append"] * 2
             if self.on("updates"):
                 kinds += ["update"] * 3
         if self.on("lambdas"):
@@ -150,6 +152,31 @@ class Statements(Expressions):
             out.append(Set(name, length, self.index(scope), self.expr(kind, scope, 2)))
         return out
 
+    def make_append(self, scope, depth=0):
+        """A list that a loop appends to, and what it has is read anywhere."""
+        r = self.random
+        self.use("appends")
+        kind = r.choice(["i32", "f32", "u64", "f64"])
+        length = r.choice([5, 20, 70])
+        name, fill, var, count = (self.fresh(stem) for stem in "akkn")
+        inner = self.inside(scope, loops=True)
+        inner.variables.append((var, "i32"))
+        length_of = Var("i32", count, solid=True)
+        test = self.expr("b1", inner, 2)
+        if r.random() < 0.4:
+            room = Op("b1", "<", [length_of, lit(r.choice([3, length // 2]))])
+            test = Op("b1", "and", [test, room] if r.random() < 0.5 else [room, test])
+        push = [Set(name, length, length_of, self.expr(kind, inner, 2)),
+                Assign(count, op("+", length_of, lit(1)))]
+        out = [Array(name, kind, length),
+               For(fill, lit(length), [Set(name, length, Var("i32", fill, solid=True),
+                                           Lit(kind, 1))], solid=True),
+               Let(count, "i32", lit(0)),
+               For(var, lit(length), [If(test, push)])]
+        scope.arrays.append((name, kind, length))
+        scope.variables.append((count, "i32"))
+        return out
+
     # --- Emissions -----------------------------------------------------------
 
     def set_fields(self, name, record, scope, share=0.5):
@@ -197,9 +224,9 @@ class Statements(Expressions):
         if hops:
             left = lit(0)
             if counted:
-                # Once if a call does it many times: each of three hops would
-                # make as many of each.
-                many = is_back and scope.multiplicity > 8
+                # One hop if a call emits many: each of three would make as many
+                # of each, on the way back or on an edge that leads to it.
+                many = self.bounds[port] > 8
                 left = op("&", Get("i32", counted[0][0], counted[0][1].leaf("hops"),
                                    solid=True), lit(1 if many else 3))
             value = op("-", left, lit(1)) if is_back else left

@@ -7,6 +7,49 @@
 
 include "mlir/Pass/PassBase.td"
 
+def ShareAppends : Pass<"piko-share-appends", "::piko::PipelineOp"> {
+  let summary = "Let threads share loops that append to lists";
+  let description = [{
+    **Requires** the machine level (`piko-form-work`); before `piko-map-threads`, which
+    says who takes what.
+
+    **Does**: stream compaction. A loop of a list's process phase that counts, and
+    changes nothing but lists that it appends to, is strip-mined. A strip is a
+    `piko.parallel_for`: a prefix sum (`piko.scan`) of what iterations append says
+    where. Fewer than 64 iterations stay a loop.
+
+    **Guarantees** the same lists, in order.
+
+    Before:
+    ```
+    %n = scf.for %i = %zero to %end step %one iter_args(%k = %zero) -> index {
+      %next = scf.if %test -> index { memref.store %i, %list[%k] ... }
+      scf.yield %next : index
+    }
+    ```
+    After:
+    ```
+    scf.for %first = %zero to %end step %c256 {
+      piko.parallel_for %count {
+      ^bb0(%i: index):
+        %before = piko.scan %flag empty %none : i32 { ... arith.addi ... }
+        scf.if %appends { memref.store %value, %list[%place] ... }
+        ...
+      }
+    }
+    ```
+
+    **Limits**: an iteration neither emits nor changes state, and reads no list. What
+    it does in vain where a list is full (`n < most`) has no loops, and cannot fail.
+  }];
+  let options = [
+    Option<"stripSize", "strip", "int64_t", "256",
+           "iterations that threads share at once (default: 256)">];
+  let dependentDialects = ["::mlir::arith::ArithDialect",
+                           "::mlir::memref::MemRefDialect",
+                           "::mlir::scf::SCFDialect"];
+}
+
 def MapThreads : Pass<"piko-map-threads", "::piko::PipelineOp"> {
   let summary = "Say how the threads of a block share a kernel's work";
   let description = [{

@@ -107,7 +107,8 @@ def PlanVectors : Pass<"piko-plan-vectors", "::piko::PipelineOp"> {
     decides, for loops over primitives, parallel loops, and loops in order whose
     iterations are independent. Those that win are marked for `piko-vectorize`. First,
     inner loops that lanes leave at different times are flattened or collapsed, and
-    iterations with nothing to do taken out by stream compaction, where that pays. Short
+    iterations with nothing to do taken out by stream compaction, where that pays; a
+    loop that appends to lists pushes (`piko.storage.push`), to be compacted likewise. Short
     loops keep a scalar version. With a `window`, loops with close estimates have two
     versions (`piko.cpu.takes_vectors`). Remarks say why.
 
@@ -126,8 +127,8 @@ def PlanVectors : Pass<"piko-plan-vectors", "::piko::PipelineOp"> {
     }
     ```
 
-    **Limits**: loops whose iterations hand on values, use views of memory, or have more
-    than 16 KiB of arrays stay scalar.
+    **Limits**: loops whose iterations hand on values, other than lengths of lists, use
+    views of memory, or have more than 16 KiB of arrays stay scalar.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",
                            "::mlir::math::MathDialect",

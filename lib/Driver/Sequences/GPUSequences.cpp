@@ -50,6 +50,8 @@ void piko::addGPUSequence(OpPassManager &passes, const GPUOptions &options,
   mapping.groups = synthesis.has("group-updates");
   mapping.counts = synthesis.has("share-by-count");
   OpPassManager &pipeline = passes.nest<PipelineOp>();
+  if (synthesis.has("share-appends"))
+    pipeline.addPass(createShareAppends());
   pipeline.addPass(createMapThreads(mapping));
   pipeline.addPass(createExpandRemainders());
   addGridSequence(pipeline, synthesis);

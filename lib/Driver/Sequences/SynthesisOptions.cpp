@@ -24,8 +24,8 @@ const std::vector<std::string> &SynthesisOptions::getOptional() {
       "unswitch-versions", "if-convert", "uplift-pixel-loops", "privatize",
       "reduce-updates", "reduce-by-atomics",
       // of a GPU
-      "collapse-pixels", "group-updates", "share-by-count", "compact-work",
-      "split-rare",
+      "share-appends", "collapse-pixels", "group-updates", "share-by-count",
+      "compact-work", "split-rare",
       // of LLVM
       "loop-vectorize", "slp-vectorizer"};
   return names;

@@ -9,6 +9,7 @@
 #include "Passes/LowerArithmetic.h"
 #include "Passes/LowerPermutations.h"
 #include "Passes/SelectBits.h"
+#include "Passes/SplitRows.h"
 #include "Passes/StoreLanes.h"
 #include "Passes/TransposeGathers.h"
 #include "Passes/UniformGathers.h"
@@ -89,6 +90,7 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
     passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
     passes.addPass(
         createModuleToFunctionPassAdaptor(CompressStoresPass(machine)));
+    passes.addPass(createModuleToFunctionPassAdaptor(SplitRowsPass(machine)));
     passes.addPass(createModuleToFunctionPassAdaptor(WidenMasksPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(UniformGathersPass(machine)));

@@ -40,16 +40,31 @@ struct Writer : CodeBuilder {
     return SmallVector<Value>(loop.getResults().drop_front());
   }
 
+  /// Conditions as the bytes that slots hold, or as they are.
   SmallVector<Value> combine(Block &body, ValueRange left, ValueRange right) {
     IRMapping mapping;
     SmallVector<Value> pair(left);
     llvm::append_range(pair, right);
-    mapping.map(body.getArguments(), pair);
+    for (auto [argument, value] : llvm::zip(body.getArguments(), pair)) {
+      bool isByte = value.getType() != argument.getType();
+      mapping.map(argument,
+                  isByte ? arith::TruncIOp::create(builder, loc,
+                                                   argument.getType(), value)
+                               .getResult()
+                         : value);
+    }
     for (Operation &op : body.without_terminator())
       builder.clone(op, mapping);
-    return llvm::map_to_vector(
-        cast<YieldOp>(body.getTerminator()).getResults(),
-        [&](Value result) { return mapping.lookupOrDefault(result); });
+    SmallVector<Value> results;
+    for (auto [result, value] :
+         llvm::zip(cast<YieldOp>(body.getTerminator()).getResults(), left)) {
+      Value combined = mapping.lookupOrDefault(result);
+      if (combined.getType() != value.getType())
+        combined =
+            arith::ExtUIOp::create(builder, loc, value.getType(), combined);
+      results.push_back(combined);
+    }
+    return results;
   }
 
   /// Whether a < b; NaNs are equal to each other and greater than all else.

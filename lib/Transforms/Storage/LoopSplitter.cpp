@@ -162,7 +162,7 @@ void LoopSplitter::splitReduce(ReduceOp op, Piece &piece) {
   create(builder, op.getLoc(), count, arrays, op.getBody().front());
   for (auto [result, array] : llvm::zip(op.getResults(), arrays))
     result.replaceAllUsesWith(
-        memref::LoadOp::create(builder, op.getLoc(), array, zero));
+        Slots::load(builder, op.getLoc(), result.getType(), array, zero));
 }
 
 void LoopSplitter::splitScan(ScanOp op, Piece &piece) {

@@ -26,8 +26,11 @@ Slots::Slots(OpBuilder &builder, Location loc, Value writer, Value count)
   release = ScratchReleaseOp::create(builder, loc, writer, mark);
 }
 
-/// What memory holds for a value: a primitive's address, or the value.
+/// What memory holds for a value: a primitive's address, the byte of a
+/// condition, of which vectors have rows, or the value.
 static Type getStoredType(Type type) {
+  if (type.isInteger(1))
+    return IntegerType::get(type.getContext(), 8);
   return isa<PrimType>(type) ? Type(IndexType::get(type.getContext())) : type;
 }
 
@@ -82,6 +85,8 @@ Value Slots::load(OpBuilder &builder, Location loc, Type type, Value slots,
   Value stored = memref::LoadOp::create(builder, loc, slots, index);
   if (isa<PrimType>(type))
     return FromAddressOp::create(builder, loc, type, stored);
+  if (type != stored.getType())
+    return arith::TruncIOp::create(builder, loc, type, stored);
   return stored;
 }
 
@@ -89,6 +94,8 @@ void Slots::store(OpBuilder &builder, Location loc, Value value, Value slots,
                   Value index) {
   if (isa<PrimType>(value.getType()))
     value = ToAddressOp::create(builder, loc, value);
+  else if (value.getType().isInteger(1))
+    value = arith::ExtUIOp::create(builder, loc, builder.getI8Type(), value);
   memref::StoreOp::create(builder, loc, value, slots, index);
 }
 

@@ -27,6 +27,7 @@
 
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "llvm/ADT/MapVector.h"
 #include "llvm/Support/FormatVariadic.h"
 
 #include <cmath>
@@ -67,8 +68,8 @@ LaneCandidate::LaneCandidate(scf::ForOp loop, double window)
                             (!ofPrimitives || getLoopPhase(loop) == "process"));
 }
 
-InFlightDiagnostic piko::remarkStage(scf::ForOp loop) {
-  InFlightDiagnostic remark = loop.emitRemark();
+InFlightDiagnostic piko::remarkStage(Operation *loop) {
+  InFlightDiagnostic remark = loop->emitRemark();
   if (StageOp stage = getKernelStage(loop))
     remark << "stage '" << stage.getSymName() << "': ";
   return remark;
@@ -107,6 +108,78 @@ static void addObstacles(InFlightDiagnostic &remark,
     else
       note << "lanes take turns, because this has no vector form";
   }
+}
+
+/// What an access reads or writes, as the text names it.
+static std::string describeAccessed(Operation *op) {
+  if (auto access = dyn_cast<StateAccessOpInterface>(op))
+    return ("'" + access.getAccessedState().getValue() + "'").str();
+  return "an array";
+}
+
+/// Where lanes access elements in different places, by line, and what share of
+/// the estimate that is; but for primitives, which are where they are.
+static void addGathers(InFlightDiagnostic &remark, const IterationLanes &lanes,
+                       const IterationLanes::Cost &cost) {
+  constexpr size_t most = 4;
+  constexpr double least = 0.1;
+  struct Line {
+    double cycles = 0;
+    Operation *first = nullptr;
+    int64_t count = 0;
+  };
+  llvm::MapVector<Location, Line> lines;
+  for (auto [part, op] : cost.obstacles)
+    if (lanes.getForm(op) == LaneForm::Access && !isa<GetOp, ItemOp>(op)) {
+      Line &line = lines[op->getLoc()];
+      line.cycles += part;
+      line.first = op;
+      ++line.count;
+    }
+  auto sorted = lines.takeVector();
+  llvm::stable_sort(sorted, [](const auto &a, const auto &b) {
+    return a.second.cycles > b.second.cycles;
+  });
+  size_t told = 0;
+  for (const auto &[where, line] : sorted) {
+    double share = line.cycles / cost.vectors;
+    if (told++ == most || share < least)
+      return;
+    bool writes = isa<StoreOp, memref::StoreOp>(line.first);
+    bool isStrided = lanes.isRow(line.first);
+    Diagnostic &note = remark.attachNote(where);
+    note << "lanes " << (writes ? "write " : "read ")
+         << (isStrided ? "a field of " : "") << describeAccessed(line.first)
+         << (isStrided ? " one after the other, by "
+                       : " in different places, by ")
+         << (line.count > 1 ? std::to_string(line.count) + " " : "a ")
+         << (writes ? "scatter" : "gather") << (line.count > 1 ? "s" : "")
+         << ": about " << std::llround(100 * share) << " % of the estimate";
+    if (told == 1)
+      note << (isStrided ? "; in a buffer of its own the field is a row"
+                         : "; where the index is the number of the iteration, "
+                           "and what all lanes share, it is a row");
+  }
+}
+
+/// How many tests of indices an iteration has, and of what.
+static void addTests(InFlightDiagnostic &remark, const IterationLanes &lanes) {
+  llvm::MapVector<StringRef, int64_t> tests;
+  scf::ForOp loop = lanes.getLoop();
+  loop.walk([&](FailOp fail) { ++tests[fail.getState()]; });
+  if (tests.empty())
+    return;
+  Diagnostic &note = remark.attachNote(loop.getLoc());
+  note << "indices are tested when the pipeline runs:";
+  StringRef separator = " ";
+  for (auto [state, count] : tests) {
+    note << separator << "'" << state << "'";
+    if (count > 1)
+      note << " " << count << " times";
+    separator = ", ";
+  }
+  note << "; --fix=NAME.size=N, or an index that is less by & or %, proves "
+          "them";
 }
 
 /// A tie goes to the simpler code. With half the lanes estimates matter more:
@@ -254,7 +327,10 @@ void LaneCandidate::remarkVectors(const IterationLanes &lanes,
               "faster: "
            << std::llround(versions->vectors) << " cycles are expected, and "
            << std::llround(versions->scalar);
-  addObstacles(remark, lanes, lanes.getCost(), /*isRefused=*/false);
+  IterationLanes::Cost cost = lanes.getCost();
+  addObstacles(remark, lanes, cost, /*isRefused=*/false);
+  addGathers(remark, lanes, cost);
+  addTests(remark, lanes);
 }
 
 bool LaneCandidate::decide(const IterationLanes &lanes, const FlatLoop &flat) {

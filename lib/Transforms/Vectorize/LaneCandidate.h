@@ -16,7 +16,7 @@ namespace piko {
 bool isSurelyFaster(const IterationLanes::Cost &cost, int64_t laneCount);
 
 /// Begins a remark at a loop that names its stage.
-mlir::InFlightDiagnostic remarkStage(mlir::scf::ForOp loop);
+mlir::InFlightDiagnostic remarkStage(mlir::Operation *loop);
 
 /// A loop that lanes may share.
 class LaneCandidate {

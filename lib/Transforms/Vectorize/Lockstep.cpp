@@ -4,11 +4,11 @@
 // to 16 iterations become one vector (IterationBarriers); others are cut into
 // loops between barriers, as piko-split-loops cuts them.
 
+#include "Piko/Transforms/Storage/CountedWhiles.h"
 #include "Piko/Transforms/Storage/LoopSplitter.h"
 #include "Piko/Transforms/Storage/ParallelLoops.h"
 #include "Vectorize/Analysis/LaneArrays.h"
 #include "Vectorize/LaneCandidate.h"
-#include "Vectorize/Shape/CountedWhiles.h"
 #include "Vectorize/Write/IterationWriter.h"
 
 #include "Piko/Dialect/Piko/IR/Marks.h"

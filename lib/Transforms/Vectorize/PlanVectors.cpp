@@ -24,12 +24,13 @@
 // AVX2, else 4. Of the passes before this one, only piko-narrow-integers knows
 // it. An object for several processors has code of each width.
 
+#include "Piko/Transforms/Storage/Appends.h"
+#include "Piko/Transforms/Storage/CountedWhiles.h"
 #include "Vectorize/Analysis/LaneArrays.h"
 #include "Vectorize/Analysis/LoopStreams.h"
 #include "Vectorize/Cost/LaneCycles.h"
 #include "Vectorize/Cost/LaneLatency.h"
 #include "Vectorize/LaneCandidate.h"
-#include "Vectorize/Shape/CountedWhiles.h"
 #include "Vectorize/Shape/LaneNests.h"
 #include "Vectorize/Shape/LaneQuotients.h"
 #include "Vectorize/Shape/SequentialLoops.h"
@@ -101,6 +102,7 @@ void PlanVectorsPass::plan(scf::ForOp loop, int64_t count, scf::ForOp scalar,
   if (!scalar) {
     scalar = cast<scf::ForOp>(builder.clone(*loop));
     scalar->removeAttr(marks::vectorLanes);
+    expandPushes(scalar);
   }
   Type type = loop.getUpperBound().getType();
   Value least = arith::ConstantOp::create(
@@ -252,26 +254,33 @@ static void splitVersions(Value takesVectors, scf::ForOp loop,
                                                      LaneMapping::Iterations));
 }
 
-/// A copy of a loop that is written in order and hands on nothing, as one that
-/// counts; null if it is another.
-static scf::ForOp copyAsCount(Operation *op) {
-  OpBuilder builder(op);
-  if (auto loop = dyn_cast<scf::ForOp>(op))
-    return loop.getNumResults() == 0 ? cast<scf::ForOp>(builder.clone(*loop))
-                                     : scf::ForOp();
-  auto loop = dyn_cast<scf::WhileOp>(op);
-  if (!loop || loop.getInits().size() != 1 || !loop->use_empty() ||
-      !findUpliftableWhile(loop))
-    return {};
-  auto copy = cast<scf::WhileOp>(builder.clone(*loop));
-  return upliftWhile(copy, *findUpliftableWhile(copy));
+/// A copy of a loop that is written in order, as one that counts and hands on
+/// nothing; lists that it appends to are pushed to, unless `pushes` is false.
+static std::optional<PushLoop> copyAsCount(Operation *op, bool pushes) {
+  if (!pushes && isa<scf::ForOp>(op) && op->getNumResults() > 0)
+    return std::nullopt;
+  if (!pushes && isa<scf::WhileOp>(op) && op->getNumResults() > 1)
+    return std::nullopt;
+  std::optional<Location> refusal;
+  std::optional<PushLoop> made = copyAsPushes(op, refusal);
+  if (refusal) {
+    InFlightDiagnostic remark = remarkStage(op);
+    explainNoPushes(remark, *refusal);
+  }
+  return made;
+}
+
+static bool appends(scf::ForOp loop) {
+  return loop->walk([](PushOp) { return WalkResult::interrupt(); })
+      .wasInterrupted();
 }
 
 static void remarkInOrder(scf::ForOp loop, int64_t laneCount, bool isCompact) {
   InFlightDiagnostic remark = remarkStage(loop);
-  remark << "iterations of this loop do not depend on one another, and are "
-            "vectorized for "
-         << laneCount << " at once";
+  remark << "iterations of this loop "
+         << (appends(loop) ? "append in order, by stream compaction"
+                           : "do not depend on one another")
+         << ", and are vectorized for " << laneCount << " at once";
   if (isCompact)
     remark << ", of those that have something to do";
 }
@@ -303,28 +312,36 @@ bool PlanVectorsPass::planInOrder(Operation *op) {
       (stage.getSchedule() &&
        stage.getSchedule().getLanes() == LaneMapping::One))
     return false;
-  scf::ForOp copy = copyAsCount(op);
-  if (!copy)
+  std::optional<PushLoop> copied = copyAsCount(op, /*pushes=*/compacts);
+  if (!copied)
     return false;
+  scf::ForOp copy = copied->loop;
   upliftWhiles(copy);
   if (!mayRunInOrder(copy, laneCount)) {
-    copy.erase();
+    copied->erase();
     return false;
   }
-  if (!(compacts && planCompacted(copy))) {
-    IterationLanes lanes(copy, laneCount);
-    IterationLanes::Cost cost = lanes.getCost();
-    if (lanes.getRefusal().at || !cost.computes ||
-        !isSurelyFaster(cost, laneCount)) {
-      copy.erase();
-      return false;
-    }
-    bool isPaired = laneCount == widestLanes && isBoundByLatency(lanes);
-    remarkInOrder(copy, (isPaired ? 2 : 1) * laneCount, /*isCompact=*/false);
-    testDivisors(lanes);
-    plan(copy, (isPaired ? 2 : 1) * laneCount);
+  auto replace = [&] {
+    op->replaceAllUsesWith(copied->results);
+    op->erase();
+    return true;
+  };
+  if (compacts && planCompacted(copy))
+    return replace();
+  IterationLanes lanes(copy, laneCount);
+  IterationLanes::Cost cost = lanes.getCost();
+  if (lanes.getRefusal().at || !cost.computes ||
+      !isSurelyFaster(cost, laneCount)) {
+    copied->erase();
+    return false;
   }
-  op->erase();
+  bool isPaired =
+      laneCount == widestLanes && !appends(copy) && isBoundByLatency(lanes);
+  remarkInOrder(copy, (isPaired ? 2 : 1) * laneCount, /*isCompact=*/false);
+  testDivisors(lanes);
+  replace();
+  padLists(copy, laneCount);
+  plan(copy, (isPaired ? 2 : 1) * laneCount);
   return true;
 }
 

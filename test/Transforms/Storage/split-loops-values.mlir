@@ -8,17 +8,19 @@ piko.record @F {"z" : f32 at 0} size 4 align 4
 // CHECK:         %[[N:.*]] = memref.load %[[LEFT]][%c0]
 // CHECK:         scf.for %[[I:.*]] = %c0 to %[[N]] step %c1 {
 // CHECK:           %[[ODD:.*]] = arith.cmpi
-// CHECK:           memref.store %[[ODD]], %[[SLOTS:.*]][%[[I]]]
-// CHECK:         %[[FIRST:.*]] = memref.load %[[SLOTS]][%c0]
+// CHECK:           %[[BYTE:.*]] = arith.extui %[[ODD]] : i1 to i8
+// CHECK:           memref.store %[[BYTE]], %[[SLOTS:.*]][%[[I]]]
+// CHECK:         %[[FIRST:.*]] = arith.trunci %{{.*}} : i8 to i1
 // CHECK:         %[[M:.*]] = memref.load %[[LEFT]][%c0]
 // CHECK:         scf.for %[[J:.*]] = %c1 to %[[M]] step %c1 iter_args(%[[AGREED:.*]] = %true)
-// CHECK:           %[[OWN:.*]] = memref.load %[[SLOTS]][%[[J]]]
+// CHECK:           %[[BYTE:.*]] = memref.load %[[SLOTS]][%[[J]]]
+// CHECK:           %[[OWN:.*]] = arith.trunci %[[BYTE]] : i8 to i1
 // CHECK:           %[[SAME:.*]] = arith.cmpi eq, %[[OWN]], %[[FIRST]]
 // CHECK:           arith.andi %[[AGREED]], %[[SAME]]
 // CHECK:           scf.if
 // CHECK:             memref.store %c0, %[[LEFT]][%c0]
 // CHECK-NEXT:        piko.fail_barrier @a iteration %[[J]]
-// CHECK:         %[[CONDITION:.*]] = memref.load %[[SLOTS]][%c0]
+// CHECK:         %[[CONDITION:.*]] = arith.trunci %{{.*}} : i8 to i1
 // CHECK:         scf.if %[[CONDITION]]
 // CHECK:           %[[SUM:.*]] = memref.load %{{.*}}[%c0] : memref<?xi32>
 // CHECK:           %[[SOME:.*]] = memref.load %[[LEFT]][%c0]

@@ -69,6 +69,7 @@ piko.pipeline @Votes rank 1 {
         }
         %kept = memref.load %own[%c1] : memref<2xf32>
         %all = arith.addf %kept, %end#1 : f32
+        // expected-note@+1 {{lanes write a field of 'out' one after the other, by a scatter}}
         piko.store %all, checked @out[%i : index] "z" : f32
         piko.yield
       }
@@ -112,6 +113,7 @@ piko.pipeline @Tree rank 1 {
       // expected-remark@+1 {{these iterations are vectorized for 8 at once}}
       piko.parallel_for %c5 {
       ^bb0(%i: index):
+        // expected-note@+1 {{lanes read a field of 'in' one after the other, by a gather}}
         %v = piko.load checked @in[%i : index] "z" : f32
         %w2 = arith.mulf %v, %v : f32
         %sum = piko.reduce %v : f32 {
@@ -120,6 +122,7 @@ piko.pipeline @Tree rank 1 {
           piko.yield results [%c : f32]
         }
         %part = arith.divf %w2, %sum : f32
+        // expected-note@+1 {{lanes write a field of 'out' one after the other, by a scatter}}
         piko.store %part, checked @out[%i : index] "z" : f32
         piko.yield
       }
@@ -200,13 +203,12 @@ piko.pipeline @Parts rank 1 {
     scf.forall (%u) in (%n) {
       %w = piko.cpu.open_writer %bins[%u] : !piko.bins<@F>
       // expected-remark@+3 {{these iterations are not vectorized: iterations may not go to a barrier together}}
-      // expected-remark-re@+2 {{8 at once are expected to take {{1[0-9]}} cycles, and one after the other}}
+      // expected-remark@+2 {{these iterations are vectorized for 8 at once}}
       // expected-remark-re@+1 {{8 at once are expected to take {{2[0-9]}} cycles, and one after the other}}
       piko.parallel_for %c16 {
       ^bb0(%i: index):
-        // expected-note@+1 {{lanes access elements in different places}}
+        // expected-note@+1 {{lanes read a field of 'in' one after the other, by a gather}}
         %n0 = piko.load checked @in[%i : index] "n" : i32
-        // expected-note@+1 {{lanes take turns, because this has no vector form}}
         %some = arith.cmpi sgt, %n0, %zero : i32
         // expected-note@+1 {{here}}
         scf.if %some {

@@ -116,6 +116,7 @@ piko.pipeline @Carried rank 1 {
           scf.condition(%more) %x : i32
         } do {
         ^bb0(%x: i32):
+          // expected-note@+1 {{lanes write 'out' in different places, by a scatter}}
           piko.store %sums#1, checked @out[%w : i32] "n" : f32
           %next = arith.addi %x, %c1 : i32
           scf.yield %next : i32

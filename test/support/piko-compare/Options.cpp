@@ -23,6 +23,7 @@ void addCaseOptions(CommandLine &line, Case &into) {
   line.addNumbers("--count", "N ..", 0, into.counts,
                   "primitives of each source; the last number is for all that "
                   "follow (1000)");
+  line.addNumber("--elements", "N", into.elements, "of each buffer (64)");
   line.addNumber("--seed", "S", into.seed, "of the input (1)");
   line.addNumber("--loop-limit", "N", into.loopLimit,
                  "of hops and rounds (0, as it is)");

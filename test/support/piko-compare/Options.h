@@ -21,6 +21,7 @@ struct Case {
   std::vector<int64_t> domain{64, 48};
   /// Primitives of each source; the last number is for all that follow.
   std::vector<int64_t> counts{1000};
+  int64_t elements = 64; ///< Of each buffer.
   unsigned seed = 1;
   /// Input of all bits, infinities and NaNs among it.
   bool wide = false;

@@ -90,7 +90,8 @@ Run::Run(Program made, const Case &input)
     check(pikort_get_state_info(pipeline, i, &info));
     if (info.kind != PIKORT_IMAGE && info.per_source < 0)
       initial[info.name] = makeRecords(
-          info.record, info.kind == PIKORT_BUFFER ? 64 : 1, info.name);
+          info.record, info.kind == PIKORT_BUFFER ? input.elements : 1,
+          info.name);
   }
 }
 

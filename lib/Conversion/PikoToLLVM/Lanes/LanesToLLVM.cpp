@@ -366,9 +366,9 @@ struct LaneElementsLowering : Lowering<LaneElementsOp> {
   }
 };
 
-/// A permutation moves bits: what has a lane, as integers of bytes.
-struct PermuteLowering : Lowering<PermuteOp> {
-  using Lowering::Lowering;
+/// Permutations move bits: what has a lane, as integers of bytes.
+template <class Op> struct MoveLowering : Lowering<Op> {
+  using Lowering<Op>::Lowering;
 
   static Value toBits(OpBuilder &builder, Location loc, Value value,
                       VectorType bits) {
@@ -392,9 +392,9 @@ struct PermuteLowering : Lowering<PermuteOp> {
     return arith::BitcastOp::create(builder, loc, type, bits);
   }
 
-  LogicalResult
-  matchAndRewrite(PermuteOp op, OpAdaptor adaptor,
-                  ConversionPatternRewriter &rewriter) const override {
+  /// Calls the function of this name that does so by `how`.
+  void replace(Op op, Value vector, Value how, StringRef prefix,
+               ConversionPatternRewriter &rewriter) const {
     Location loc = op.getLoc();
     auto type = cast<VectorType>(op.getType());
     Type element = type.getElementType();
@@ -402,16 +402,35 @@ struct PermuteLowering : Lowering<PermuteOp> {
     constexpr unsigned byteSize = 8;
     width = std::max(width, byteSize);
     VectorType bits = type.clone(rewriter.getIntegerType(width));
-    LLVM::LLVMFuncOp function = context.pureFunction(
-        rewriter, getPermutationName(type.getNumElements(), width),
-        LLVM::LLVMFunctionType::get(bits, {bits, op.getLanes().getType()}));
-    Value moved =
-        LLVM::CallOp::create(
-            rewriter, loc, function,
-            ValueRange{toBits(rewriter, loc, adaptor.getVector(), bits),
-                       adaptor.getLanes()})
-            .getResult();
+    LLVM::LLVMFuncOp function = this->context.pureFunction(
+        rewriter, getMoveName(prefix, type.getNumElements(), width),
+        LLVM::LLVMFunctionType::get(bits, {bits, how.getType()}));
+    Value moved = LLVM::CallOp::create(
+                      rewriter, loc, function,
+                      ValueRange{toBits(rewriter, loc, vector, bits), how})
+                      .getResult();
     rewriter.replaceOp(op, fromBits(rewriter, loc, moved, type));
+  }
+};
+
+struct PermuteLowering : MoveLowering<PermuteOp> {
+  using MoveLowering::MoveLowering;
+  LogicalResult
+  matchAndRewrite(PermuteOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    replace(op, adaptor.getVector(), adaptor.getLanes(), permutationPrefix,
+            rewriter);
+    return success();
+  }
+};
+
+struct CompressLowering : MoveLowering<CompressOp> {
+  using MoveLowering::MoveLowering;
+  LogicalResult
+  matchAndRewrite(CompressOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    replace(op, adaptor.getVector(), adaptor.getMask(), compressionPrefix,
+            rewriter);
     return success();
   }
 };
@@ -421,7 +440,7 @@ struct PermuteLowering : Lowering<PermuteOp> {
 void piko::populateLanesToLLVMPatterns(const TypeConverter &converter,
                                        RewritePatternSet &patterns,
                                        LoweringContext &context) {
-  patterns.add<GatherLowering, LaneElementsLowering, LaneGetLowering,
-               LaneItemsLowering, PermuteLowering, ScatterLowering>(
-      converter, patterns.getContext(), context);
+  patterns.add<CompressLowering, GatherLowering, LaneElementsLowering,
+               LaneGetLowering, LaneItemsLowering, PermuteLowering,
+               ScatterLowering>(converter, patterns.getContext(), context);
 }

@@ -151,6 +151,27 @@ LogicalResult PermuteOp::verify() {
   return success();
 }
 
+LogicalResult CompressOp::verify() {
+  return verifyLaneCount(*this, getMask().getType(), getVector().getType(),
+                         "a number");
+}
+
+LogicalResult PushOp::verify() {
+  if (getValues().size() != getArrays().size())
+    return emitOpError("expected an array for each of ")
+           << getValues().size() << " numbers, but got " << getArrays().size();
+  for (auto [value, array] :
+       llvm::zip(getValues().getTypes(), getArrays().getTypes()))
+    if (value != cast<MemRefType>(array).getElementType())
+      return emitOpError("expected an array of ")
+             << value << ", but got " << array;
+  Type count = cast<MemRefType>(getCount().getType()).getElementType();
+  if (getLimit() && getLimit().getType() != count)
+    return emitOpError("expected a limit of ")
+           << count << ", but got " << getLimit().getType();
+  return success();
+}
+
 LogicalResult OpenWriterOp::verifySymbolUses(SymbolTableCollection &) {
   return getStageAttr() ? verifyStage(*this, getStageAttr()) : success();
 }

@@ -33,8 +33,11 @@ public:
   /// Before the call.
   PermutationWriter(CallInst *call, const TargetMachine &machine);
   Value *write() { return permute(call->getArgOperand(0)); }
+  /// Where the call has a mask.
+  Value *compress();
 
 private:
+  Value *loadLanes(Value *mask);
   Value *permute(Value *vector);
   Value *permuteWords(Value *vector);
   Value *permuteDoubleWords(Value *vector);
@@ -43,7 +46,7 @@ private:
 
   CallInst *call;
   IRBuilder<> builder;
-  Value *lanes;
+  Value *lanes; ///< Or a mask of them.
   unsigned count;
   const WordPermutation *instruction = nullptr; ///< if there is one
 };
@@ -162,13 +165,67 @@ Value *PermutationWriter::permute(Value *vector) {
   return builder.CreateTrunc(permuteWords(words), type);
 }
 
+/// Which lanes there are, by their mask, out of a table. What stands after them
+/// does not matter.
+Value *PermutationWriter::loadLanes(Value *mask) {
+  Module &module = *call->getModule();
+  auto *bytes = FixedVectorType::get(builder.getInt8Ty(), count);
+  auto *type = ArrayType::get(bytes, size_t(1) << count);
+  std::string name = ("piko.compressions.v" + Twine(count)).str();
+  auto *table = cast<GlobalVariable>(module.getOrInsertGlobal(name, type, [&] {
+    SmallVector<Constant *> rows;
+    for (unsigned bits = 0; bits < 1u << count; ++bits) {
+      SmallVector<uint8_t> row;
+      for (unsigned lane = 0; lane < count; ++lane)
+        if (bits >> lane & 1)
+          row.push_back(lane);
+      row.resize(count);
+      rows.push_back(ConstantDataVector::get(module.getContext(), row));
+    }
+    return new GlobalVariable(module, type, /*isConstant=*/true,
+                              GlobalValue::PrivateLinkage,
+                              ConstantArray::get(type, rows), name);
+  }));
+  Value *bits = builder.CreateBitCast(mask, builder.getIntNTy(count));
+  Value *row = builder.CreateInBoundsGEP(
+      bytes, table, builder.CreateZExt(bits, builder.getInt64Ty()));
+  return builder.CreateZExt(builder.CreateLoad(bytes, row),
+                            FixedVectorType::get(builder.getInt32Ty(), count));
+}
+
+Value *PermutationWriter::compress() {
+  constexpr unsigned mostInTable = 8;
+  Value *vector = call->getArgOperand(0), *mask = lanes;
+  Type *type = vector->getType();
+  auto *words = FixedVectorType::get(builder.getInt32Ty(), count);
+  auto select = [&](Value *from) {
+    return builder.CreateIntrinsic(
+        Intrinsic::experimental_vector_compress, {from->getType()},
+        {from, mask, PoisonValue::get(from->getType())});
+  };
+  if (instruction && count <= mostInTable) {
+    lanes = loadLanes(mask);
+    return permute(vector);
+  }
+  unsigned width = type->getScalarSizeInBits();
+  if (!instruction || width == 32)
+    return select(vector);
+  if (width < 32)
+    return builder.CreateTrunc(select(builder.CreateZExt(vector, words)), type);
+  SmallVector<uint32_t> numbers = to_vector(seq<uint32_t>(0, count));
+  lanes = select(ConstantDataVector::get(builder.getContext(), numbers));
+  return permute(vector);
+}
+
 void piko::lowerPermutations(Module &module, const TargetMachine &machine) {
   for (Function &function : make_early_inc_range(module)) {
-    if (!function.getName().starts_with(permutationPrefix))
+    bool compresses = function.getName().starts_with(compressionPrefix);
+    if (!compresses && !function.getName().starts_with(permutationPrefix))
       continue;
     for (User *user : make_early_inc_range(function.users())) {
       auto *call = cast<CallInst>(user);
-      call->replaceAllUsesWith(PermutationWriter(call, machine).write());
+      PermutationWriter writer(call, machine);
+      call->replaceAllUsesWith(compresses ? writer.compress() : writer.write());
       call->eraseFromParent();
     }
     function.eraseFromParent();

@@ -14,8 +14,9 @@
 namespace piko {
 
 /// A pass `Pass` on functions, to run behind the optimizer. Its `change` says
-/// whether it has changed a function, of which it keeps the blocks; it gets
-/// those whose processor has `Pass::features`. Where `Pass::readsBeyond` is
+/// whether it has changed a function, of which it keeps the blocks unless
+/// `Pass::keepsBlocks` is false; it gets those whose processor has
+/// `Pass::features`. Where `Pass::readsBeyond` is
 /// true, it may load what lies beside an object, of which AddressSanitizer
 /// would tell: functions for it stay as they are.
 template <class Pass> class ProcessorPass : public llvm::PassInfoMixin<Pass> {
@@ -32,11 +33,12 @@ public:
     if (!applies || !static_cast<Pass *>(this)->change(function, analyses))
       return llvm::PreservedAnalyses::all();
     llvm::PreservedAnalyses preserved;
-    preserved.preserveSet<llvm::CFGAnalyses>();
+    if (Pass::keepsBlocks)
+      preserved.preserveSet<llvm::CFGAnalyses>();
     return preserved;
   }
 
-  static constexpr bool readsBeyond = false;
+  static constexpr bool readsBeyond = false, keepsBlocks = true;
 
 private:
   const llvm::TargetMachine *machine;

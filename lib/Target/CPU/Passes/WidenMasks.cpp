@@ -4,6 +4,7 @@
 #include "llvm/ADT/MapVector.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/IR/InstIterator.h"
+#include "llvm/IR/PatternMatch.h"
 
 using namespace llvm;
 
@@ -57,8 +58,29 @@ static void widen(PHINode *phi) {
   spread(mask, wide);
 }
 
+/// A choice between a mask and none, as lanes that go on have it, where `and`
+/// is one instruction: what is chosen may be poison where it is not.
+static bool makeConjunctions(Function &function) {
+  SmallVector<SelectInst *> selects;
+  for (Instruction &instruction : instructions(function)) {
+    auto *select = dyn_cast<SelectInst>(&instruction);
+    if (select && isMask(select->getType()) &&
+        isMask(select->getCondition()->getType()) &&
+        match(select->getFalseValue(), PatternMatch::m_Zero()))
+      selects.push_back(select);
+  }
+  for (SelectInst *select : selects) {
+    IRBuilder<> builder(select);
+    select->replaceAllUsesWith(builder.CreateAnd(
+        select->getCondition(), builder.CreateFreeze(select->getTrueValue())));
+    select->eraseFromParent();
+  }
+  return !selects.empty();
+}
+
 bool piko::WidenMasksPass::change(Function &function,
                                   FunctionAnalysisManager &) {
+  bool isChanged = makeConjunctions(function);
   SmallVector<PHINode *> phis;
   SmallVector<Instruction *> masks;
   for (Instruction &instruction : instructions(function)) {
@@ -77,5 +99,5 @@ bool piko::WidenMasksPass::change(Function &function,
   }
   for (PHINode *phi : phis)
     widen(phi);
-  return !masks.empty() || !phis.empty();
+  return isChanged || !masks.empty() || !phis.empty();
 }

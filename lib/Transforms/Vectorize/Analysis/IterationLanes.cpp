@@ -55,13 +55,14 @@ static int64_t countInstructions(Operation *op) {
 /// Adds up the instructions of a side that has no effect where no lane is
 /// active; false if it may have one, or takes long.
 bool IterationLanes::addInstructions(Region &region, bool isOfStrip,
-                                     int64_t &count) const {
+                                     bool isNested, int64_t &count) const {
   for (Operation &op : region.front().without_terminator()) {
     LaneForm form = getForm(&op);
-    if (isa<scf::IfOp>(op) && isOfStrip && isVarying(op.getOperand(0))) {
+    if (isa<scf::IfOp>(op) && isNested && isVarying(op.getOperand(0))) {
       for (Region &side : op.getRegions())
-        if (!side.empty() && !addInstructions(side, isOfStrip, count))
+        if (!side.empty() && !addInstructions(side, isOfStrip, isNested, count))
           return false;
+      count += isOfStrip ? 0 : op.getNumResults(); // chosen
       continue;
     }
     bool isFree =
@@ -77,10 +78,10 @@ bool IterationLanes::addInstructions(Region &region, bool isOfStrip,
 
 // Hardly any vector of a strip is empty, and where one is, a branch is seldom
 // foreseen: without it, the next row's pixels are asked for in the meantime.
-bool IterationLanes::isCheap(Region &region) const {
+bool IterationLanes::isCheap(Region &region, bool isNested) const {
   constexpr int64_t most = 12, mostOfStrip = 64;
   bool isOfStrip = isOneVector(loop, getLaneCount());
   int64_t count = 0;
-  return addInstructions(region, isOfStrip, count) &&
+  return addInstructions(region, isOfStrip, isNested || isOfStrip, count) &&
          count <= (isOfStrip ? mostOfStrip : most);
 }

@@ -22,8 +22,10 @@ public:
   /// has at most as many iterations as there are lanes.
   IterationLanes(mlir::scf::ForOp loop, int64_t laneCount);
 
-  /// Whether a side of a condition is short, and may be computed for nothing.
-  bool isCheap(mlir::Region &region) const;
+  /// Whether a side of a condition is short, and may be computed for nothing;
+  /// with `isNested` also if there are conditions in it, of which scalar code
+  /// would make branches.
+  bool isCheap(mlir::Region &region, bool isNested = false) const;
   /// Estimates for as many iterations as there are lanes, in cycles.
   struct Cost {
     double vectors = 0, serial = 0; ///< at once, and one after the other
@@ -58,7 +60,7 @@ private:
   void analyze();
   /// Whether there were any.
   bool splitArraysOfIterations();
-  bool addInstructions(mlir::Region &region, bool isOfStrip,
+  bool addInstructions(mlir::Region &region, bool isOfStrip, bool isNested,
                        int64_t &count) const;
 };
 

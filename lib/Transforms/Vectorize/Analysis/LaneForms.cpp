@@ -146,6 +146,8 @@ void LaneForms::findArrays() {
       privates.insert(array);
     } else if (auto store = dyn_cast<memref::StoreOp>(op)) {
       changed.insert(store.getMemRef());
+    } else if (auto push = dyn_cast<PushOp>(op)) {
+      changed.insert_range(push.getArrays());
     } else if (op->getNumResults() == 1 &&
                isa<BaseMemRefType>(op->getResult(0).getType())) {
       refuse(op, "it makes a view of memory");
@@ -431,7 +433,7 @@ LaneForm LaneForms::getForm(Operation *op) const {
                    llvm::none_of(op->getResults(), varies);
   if (isUniform && (isMemoryEffectFree(op) || isa<LoadOp, memref::LoadOp>(op)))
     return LaneForm::Uniform;
-  if (isAccess(op))
+  if (isAccess(op) || isa<PushOp>(op))
     return LaneForm::Access;
   if (hasVectorForm(op) && llvm::all_of(op->getOperandTypes(), isLaneType) &&
       llvm::all_of(op->getResultTypes(), isLaneType))

@@ -64,6 +64,7 @@ private:
   /// How many of the lanes make an iteration of a loop.
   double getGoing(Operation *loop) const;
   void addEmission(Operation *op, Frequency times);
+  void addPush(PushOp push, Frequency times, bool laneByLane);
   /// What iterations wait for where iterations say where the next ones load.
   void addChase(LoadOp load, Frequency times, bool laneByLane);
 
@@ -409,6 +410,18 @@ void CostModel::addEmission(Operation *op, Frequency times) {
                        cycles.emitted * double(record.getSize()) / wordSize);
 }
 
+/// Vectors are compressed and stored, and their lanes counted.
+void CostModel::addPush(PushOp push, Frequency times, bool laneByLane) {
+  constexpr double counting = 4; // operations
+  auto lists = double(push.getArrays().size());
+  double serial = times.serial * (cycles.scalarAccess * lists + cycles.scalar);
+  cost.computes = true;
+  cost.serial += serial;
+  cost.vectors += laneByLane ? serial
+                             : times.vectors * (cycles.compressed * lists +
+                                                counting * cycles.vector);
+}
+
 void CostModel::addChase(LoadOp load, Frequency times, bool laneByLane) {
   // A nest that is flattened chooses where its iterations read; it was looked
   // at before.
@@ -435,6 +448,8 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
     return; // free, or rare
   if (!laneByLane && lanes.isEmission(op))
     return addEmission(op, times);
+  if (auto push = dyn_cast<PushOp>(op))
+    return addPush(push, times, laneByLane);
   LaneForm form = lanes.getForm(op);
   if (form == LaneForm::Barrier) {
     cost.computes |= op->getNumResults() != 0;

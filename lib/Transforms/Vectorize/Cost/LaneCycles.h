@@ -29,8 +29,8 @@ struct Cycles {
   double narrowGather, ownLines;
   /// One of several words of an element that are read at once.
   double transposed;
-  /// A word of a record that is emitted.
-  double emitted;
+  /// A word of a record that is emitted, and one that is appended to a list.
+  double emitted, compressed;
   /// A scatter, and of numbers below 32 bits; and what each row takes of a
   /// short array that is read, or written, at places that differ.
   double scatter, narrowScatter, readRow, writeRow;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Loops in order, as lanes and in compacted form. Iterations may emit, which
-// keeps its order in lanes, too.
+// Loops in order, as lanes and in compacted form. Iterations may emit, and
+// append to lists (Appends), which keeps its order in lanes, too.
 //
 // Stream compaction: where all that an iteration does stands under a condition,
 // and has a loop of its own, a first loop finds which of 1,024 iterations have
@@ -79,7 +79,7 @@ bool Effects::isOfIteration(AppendBinOp place) {
 bool Effects::isKnown(Operation *op) {
   if (auto place = dyn_cast<AppendBinOp>(op))
     return isOfIteration(place);
-  if (isa<AppendOp>(op))
+  if (isa<AppendOp, PushOp>(op)) // of a list that nothing else here knows
     return true;
   if (auto store = dyn_cast<StoreOp>(op))
     return isOnce(store);
@@ -125,7 +125,7 @@ static Value stripAllCasts(Value value) {
 
 /// Whether an operation computes a number, and not a place in memory alone.
 static bool computes(Operation *op) {
-  if (isa<scf::ForOp, scf::WhileOp>(op))
+  if (isa<scf::ForOp, scf::WhileOp, PushOp>(op))
     return true;
   if (op->getNumOperands() == 0 || op->getNumResults() != 1 || !isPure(op) ||
       isa<CastOpInterface>(op))

@@ -57,7 +57,7 @@ SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask,
   };
   Value outer = active;
   active = mask;
-  if (lanes.isCheap(region)) {
+  if (lanes.isCheap(region, /*isNested=*/true)) {
     writeBlock(region.front());
     collect();
     active = outer;
@@ -394,13 +394,7 @@ Value IterationWriter::writeActive(Value left) {
   if (!left.getType().isIndex())
     left = arith::IndexCastUIOp::create(builder, loc, builder.getIndexType(),
                                         left);
-  left = arith::IndexCastOp::create(builder, loc, word, left);
-  SmallVector<int32_t> steps =
-      llvm::to_vector(llvm::seq<int32_t>(0, laneCount));
-  Value step = arith::ConstantOp::create(
-      builder, loc, DenseIntElementsAttr::get(getVectorType(word), steps));
-  return arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt, step,
-                               splat(left));
+  return getFirstLanes(arith::IndexCastOp::create(builder, loc, word, left));
 }
 
 void IterationWriter::write(OpBuilder::InsertPoint place) {

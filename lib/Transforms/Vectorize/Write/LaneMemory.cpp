@@ -2,9 +2,11 @@
 #include "Vectorize/Write/LaneMemory.h"
 
 #include "Piko/Analysis/TargetModel.h"
+#include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
+#include "mlir/Dialect/Math/IR/Math.h"
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
 #include "mlir/IR/TypeUtilities.h"
@@ -189,7 +191,75 @@ SmallVector<Value> LaneMemory::getPlaces(ValueRange indices) {
   return at;
 }
 
+/// How many lanes push: the active ones, but no more than there is room for.
+Value LaneMemory::countPushed(PushOp push, Value count) {
+  CodeBuilder at(builder, loc);
+  Type word = builder.getI64Type();
+  Value pushed = arith::ExtUIOp::create(
+      builder, loc, word, math::CtPopOp::create(builder, loc, getBits(active)));
+  if (!push.getLimit())
+    return pushed;
+  auto widen = [&](Value number) -> Value {
+    if (number.getType() == word)
+      return number;
+    if (number.getType().isIndex())
+      return arith::IndexCastOp::create(builder, loc, word, number);
+    if (push.getIsUnsigned())
+      return arith::ExtUIOp::create(builder, loc, word, number);
+    return arith::ExtSIOp::create(builder, loc, word, number);
+  };
+  Value limit = widen(getUniform(push.getLimit())), known = widen(count);
+  Value hasRoom = at.compare(push.getIsUnsigned() ? CodeBuilder::P::ult
+                                                  : CodeBuilder::P::slt,
+                             known, limit);
+  Value none =
+      arith::ConstantOp::create(builder, loc, builder.getIntegerAttr(word, 0));
+  Value room = at.select(hasRoom, at.sub(limit, known), none);
+  return arith::MinUIOp::create(builder, loc, pushed, room);
+}
+
+/// Where a vector is stored to a padded list: where that is full, or was too
+/// long already, to what pads it.
+Value LaneMemory::getPaddedPlace(PushOp push, Value array, Value place) {
+  if (!push.getLimit())
+    return place;
+  int64_t size = cast<MemRefType>(array.getType()).getNumElements() - laneCount;
+  return arith::MinUIOp::create(
+      builder, loc, place, arith::ConstantIndexOp::create(builder, loc, size));
+}
+
+void LaneMemory::writePush(PushOp push) {
+  CodeBuilder at(builder, loc);
+  Value memory = getUniform(push.getCount()), zero = at.index(0);
+  Value count = at.load(memory, zero);
+  Value pushed = countPushed(push, count), place = count;
+  auto isPushed = [&] {
+    return getFirstLanes(
+        arith::TruncIOp::create(builder, loc, builder.getI32Type(), pushed));
+  };
+  if (!count.getType().isIndex())
+    place =
+        arith::IndexCastOp::create(builder, loc, builder.getIndexType(), count);
+  for (auto [value, array] : llvm::zip(push.getValues(), push.getArrays())) {
+    Value first = CompressOp::create(builder, loc, get(value), active);
+    if (push.getPadded())
+      vector::StoreOp::create(builder, loc, first, getUniform(array),
+                              getPaddedPlace(push, array, place));
+    else
+      vector::MaskedStoreOp::create(builder, loc, getUniform(array), place,
+                                    isPushed(), first);
+  }
+  Type type = count.getType();
+  if (type.isIndex())
+    pushed = arith::IndexCastOp::create(builder, loc, type, pushed);
+  else if (type != pushed.getType())
+    pushed = arith::TruncIOp::create(builder, loc, type, pushed);
+  at.store(at.add(count, pushed), memory, zero);
+}
+
 void LaneMemory::writeAccess(Operation *op) {
+  if (auto push = dyn_cast<PushOp>(op))
+    return writePush(push);
   if (isa<memref::LoadOp, memref::StoreOp>(op))
     return writeArrayAccess(op);
   if (isa<ItemOp, GetOp>(op))

@@ -52,6 +52,9 @@ private:
   void writeRow(mlir::Value columns, mlir::Value row, mlir::Value mask,
                 mlir::Value value);
   void writeItemAccess(mlir::Operation *op);
+  void writePush(PushOp push);
+  mlir::Value countPushed(PushOp push, mlir::Value count);
+  mlir::Value getPaddedPlace(PushOp push, mlir::Value array, mlir::Value place);
   /// The place of an index in the lanes' columns of an array.
   mlir::Value getColumns(mlir::Value index);
 

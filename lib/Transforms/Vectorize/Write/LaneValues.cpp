@@ -56,6 +56,16 @@ Value LaneValues::createMask(llvm::function_ref<bool(int64_t)> holds) {
       DenseElementsAttr::get(getVectorType(builder.getI1Type()), lanes));
 }
 
+Value LaneValues::getFirstLanes(Value count) {
+  SmallVector<int32_t> steps =
+      llvm::to_vector(llvm::seq<int32_t>(0, laneCount));
+  Value step = arith::ConstantOp::create(
+      builder, loc,
+      DenseIntElementsAttr::get(getVectorType(builder.getI32Type()), steps));
+  return arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::slt, step,
+                               splat(count));
+}
+
 Value LaneValues::number(int64_t value) {
   return arith::ConstantOp::create(
       builder, loc,

@@ -38,6 +38,8 @@ protected:
   /// Values where the mask holds, and others elsewhere.
   mlir::Value choose(mlir::Value mask, mlir::Value yes, mlir::Value no);
   mlir::Value createMask(llvm::function_ref<bool(int64_t)> holds);
+  /// The mask of so many lanes, an integer of 32 bits, from the first on.
+  mlir::Value getFirstLanes(mlir::Value count);
   /// What has a bit for each lane.
   mlir::Type getWord();
   mlir::Value getBits(mlir::Value mask);

@@ -127,6 +127,51 @@ piko.pipeline @P rank 1 {
 
 // -----
 
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %v = arith.constant dense<1.0> : vector<16xf32>
+    %mask = arith.constant dense<true> : vector<8xi1>
+    // expected-error@+1 {{'piko.cpu.compress' op expected a number for each of 8 lanes, but got 'vector<16xf32>'}}
+    %r = piko.cpu.compress %v mask %mask : vector<16xf32>, vector<8xi1>
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %v = arith.constant 1.0 : f32
+    %count = memref.alloca() : memref<1xi32>
+    // expected-error@+1 {{'piko.storage.push' op expected an array for each of 1 numbers, but got 0}}
+    piko.storage.push (%v : f32) count %count : memref<1xi32>
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %v = arith.constant 1.0 : f32
+    %list = memref.alloca() : memref<64xi32>
+    %count = memref.alloca() : memref<1xi32>
+    // expected-error@+1 {{'piko.storage.push' op expected an array of 'f32', but got 'memref<64xi32>'}}
+    piko.storage.push (%v : f32) to (%list : memref<64xi32>) count %count : memref<1xi32>
+  }
+}
+
+// -----
+
+piko.pipeline @P rank 1 {
+  piko.kernel @k {
+    %most = arith.constant 64 : i64
+    %count = memref.alloca() : memref<1xi32>
+    // expected-error@+1 {{'piko.storage.push' op expected a limit of 'i32', but got 'i64'}}
+    piko.storage.push count %count below %most : memref<1xi32>, i64
+  }
+}
+
+// -----
+
 piko.record @V {"x" : f32 at 0, "y" : i32 at 4} size 8 align 4
 piko.pipeline @P rank 1 {
   piko.buffer @out : @V

@@ -63,6 +63,21 @@ piko.pipeline @P rank 2 {
     // CHECK: piko.cpu.permute %[[A]][%{{.*}}] : vector<16xf32>, vector<16xi32>
     %lanes = arith.constant dense<3> : vector<16xi32>
     %p = piko.cpu.permute %a[%lanes] : vector<16xf32>, vector<16xi32>
+    // CHECK: piko.cpu.compress %[[A]] mask %{{.*}} : vector<16xf32>, vector<16xi1>
+    %some = arith.cmpf olt, %a, %p : vector<16xf32>
+    %front = piko.cpu.compress %a mask %some : vector<16xf32>, vector<16xi1>
+    %one = arith.constant 1.0 : f32
+    %most = arith.constant 64 : i32
+    %list = memref.alloca() : memref<64xf32>
+    %numbers = memref.alloca() : memref<64xi32>
+    %count = memref.alloca() : memref<1xi32>
+    // CHECK: piko.storage.push(%{{.*}} : f32) to(%{{.*}} : memref<64xf32>) count %{{.*}} : memref<1xi32>
+    piko.storage.push(%one : f32) to(%list : memref<64xf32>) count %count : memref<1xi32>
+    // CHECK: piko.storage.push(%{{.*}}, %{{.*}} : f32, i32) to(%{{.*}}, %{{.*}} : memref<64xf32>, memref<64xi32>) count %{{.*}} below %{{.*}} unsigned padded : memref<1xi32>, i32
+    piko.storage.push(%one, %most : f32, i32) to(%list, %numbers : memref<64xf32>, memref<64xi32>)
+      count %count below %most unsigned padded : memref<1xi32>, i32
+    // CHECK: piko.storage.push count %{{.*}} : memref<1xi32>
+    piko.storage.push count %count : memref<1xi32>
     piko.storage.close_bins %bins : !piko.bins<@F>
   }
 }

@@ -109,7 +109,9 @@ piko.pipeline @Chases rank 1 {
           scf.condition(%more) %at, %sum : i32, f32
         } do {
         ^bb0(%at: i32, %sum: f32):
+          // expected-note@+1 {{lanes read 'nodes' in different places, by a gather}}
           %next = piko.load checked @nodes[%at : i32] "next" : i32
+          // expected-note@+1 {{lanes read 'nodes' in different places, by a gather}}
           %x = piko.load checked @nodes[%at : i32] "x" : f32
           %more = arith.addf %sum, %x : f32
           scf.yield %next, %more : i32, f32

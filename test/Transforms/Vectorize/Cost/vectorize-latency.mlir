@@ -32,6 +32,7 @@ piko.pipeline @Chain rank 1 {
           %next = arith.addf %more, %one : f32
           scf.yield %next : f32
         }
+        // expected-note@+1 {{lanes write 'out' in different places, by a scatter}}
         piko.store %end, checked @out[%index : i32] "z" : f32
       } {piko.lanes, piko.mapping = #piko<lanes items>}
     }

@@ -40,6 +40,7 @@ piko.pipeline @Searches rank 1 {
         ^bb0(%sum: i32, %x: i32):
           %first = arith.muli %k, %x : i32
           %found:2 = scf.while (%at = %first) : (i32) -> (i32, i32) {
+            // expected-note@+1 {{lanes read 'table' in different places, by a gather}}
             %0 = piko.load checked @table[%at : i32] "n" : i32
             %1 = arith.muli %0, %0 : i32
             %2 = arith.addi %1, %0 : i32

@@ -180,6 +180,41 @@ def Piko_ItemOp : Piko_StorageOp<"item", [Pure]> {
   }];
 }
 
+def Piko_ListMemory : MemRefRankOf<[F32, F64, I8, I16, I32, I64, Index], [1]>;
+def Piko_ListCount : MemRefRankOf<[I32, I64, Index], [1]>;
+
+def Piko_PushOp : Piko_StorageOp<"push", [
+    AttrSizedOperandSegments, MemoryEffects<[MemRead, MemWrite]>]> {
+  let hasVerifier = 1;
+  let summary = "appends numbers to lists of one length";
+  let description = [{
+    Stores each number into its array at the count, which is the first element of its
+    own array, and counts one up. With `below`, only where the count is less than that
+    number; `unsigned` says how these two compare. Lanes of a vector push one after
+    the other, by stream compaction. With `padded` they may also overwrite what stands
+    after the new count: nothing else is in the arrays, which have as many more
+    elements as there are lanes. Without a limit a count is inside of the arrays.
+
+    ```mlir
+    %zs = memref.alloca() : memref<64xf32>
+    %numbers = memref.alloca() : memref<64xi32>
+    %count = memref.alloca() : memref<1xi32>
+    piko.storage.push(%z, %x : f32, i32)
+      to(%zs, %numbers : memref<64xf32>, memref<64xi32>)
+      count %count below %x : memref<1xi32>, i32
+    piko.storage.push count %count : memref<1xi32>
+    ```
+  }];
+  let arguments = (ins Variadic<Piko_Scalar>:$values, Variadic<Piko_ListMemory>:$arrays,
+                       Piko_ListCount:$count, Optional<AnySignlessIntegerOrIndex>:$limit,
+                       UnitAttr:$isUnsigned, UnitAttr:$padded);
+  let assemblyFormat = [{
+    (`(` $values^ `:` type($values) `)`)? (`to` `(` $arrays^ `:` type($arrays) `)`)?
+    `count` $count (`below` $limit^)? (`unsigned` $isUnsigned^)?
+    (`padded` $padded^)? attr-dict `:` type($count) (`,` type($limit)^)?
+  }];
+}
+
 def Piko_PrefetchItemOp : Piko_CPUOp<"prefetch_item"> {
   let summary = "says that the primitive at a position will be read";
   let description = [{

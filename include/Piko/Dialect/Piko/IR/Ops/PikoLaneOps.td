@@ -269,6 +269,25 @@ def Piko_PermuteOp : Piko_CPUOp<"permute", [
   }];
 }
 
+def Piko_CompressOp : Piko_CPUOp<"compress", [
+    Pure, AllTypesMatch<["vector", "result"]>]> {
+  let hasVerifier = 1;
+  let summary = "brings lanes in a mask to the front";
+  let description = [{
+    In their order; what the lanes after them have does not matter. One instruction,
+    where the processor has it, or a permutation that a table says.
+
+    ```mlir
+    %r = piko.cpu.compress %values mask %mask : vector<16xf32>, vector<16xi1>
+    ```
+  }];
+  let arguments = (ins Piko_Permutable:$vector, Piko_LaneMask:$mask);
+  let results = (outs Piko_Permutable:$result);
+  let assemblyFormat = [{
+    $vector `mask` $mask attr-dict `:` type($vector) `,` type($mask)
+  }];
+}
+
 def Piko_LaneBins : VectorOfRankAndType<[1], [Index]>;
 
 def Piko_LaneAppendOp : Piko_CPUOp<"append", [

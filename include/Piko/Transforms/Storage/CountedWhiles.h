@@ -2,8 +2,8 @@
 //
 // Loops that count, written with a condition.
 
-#ifndef PIKO_LIB_TRANSFORMS_COUNTEDWHILES_H
-#define PIKO_LIB_TRANSFORMS_COUNTEDWHILES_H
+#ifndef PIKO_TRANSFORMS_STORAGE_COUNTEDWHILES_H
+#define PIKO_TRANSFORMS_STORAGE_COUNTEDWHILES_H
 
 #include "Piko/Analysis/CountedLoop.h"
 
@@ -13,8 +13,10 @@ namespace piko {
 /// it.
 std::optional<CountedLoop> findUpliftableWhile(mlir::scf::WhileOp loop);
 
-mlir::scf::ForOp upliftWhile(mlir::scf::WhileOp loop,
-                             const CountedLoop &counted);
+/// `results`, if not null, gets what stands for those of the loop.
+mlir::scf::ForOp
+upliftWhile(mlir::scf::WhileOp loop, const CountedLoop &counted,
+            llvm::SmallVectorImpl<mlir::Value> *results = nullptr);
 
 /// Makes loops that count of those inside of which one knows how often they
 /// iterate, in 64 bits.
@@ -22,4 +24,4 @@ void upliftWhiles(mlir::scf::ForOp root);
 
 } // namespace piko
 
-#endif // PIKO_LIB_TRANSFORMS_COUNTEDWHILES_H
+#endif // PIKO_TRANSFORMS_STORAGE_COUNTEDWHILES_H
