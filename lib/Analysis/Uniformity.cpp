@@ -218,9 +218,11 @@ bool Uniformity::isInside(Value array) const {
   return made && root->isProperAncestor(made);
 }
 
-/// Whether an operation accesses arrays, and hands none on.
-static bool accessesArrays(Operation *op) {
-  return isa<memref::LoadOp, memref::StoreOp, vector::LoadOp, vector::StoreOp,
+/// Whether an operation accesses an array, and does not hand it on.
+static bool accesses(Operation *op, Value array) {
+  if (auto store = dyn_cast<memref::StoreOp>(op))
+    return store.getValue() != array;
+  return isa<memref::LoadOp, vector::LoadOp, vector::StoreOp,
              vector::MaskedLoadOp, vector::MaskedStoreOp, vector::GatherOp,
              vector::ScatterOp, vector::CompressStoreOp, PushOp>(op);
 }
@@ -231,7 +233,7 @@ bool Uniformity::isFinished(Value array) const {
   auto made = array.getDefiningOp<memref::AllocaOp>();
   return made && llvm::all_of(made->getUsers(), [&](Operation *user) {
            return isa<memref::LoadOp>(user) ||
-                  (accessesArrays(user) && !root->isAncestor(user));
+                  (accesses(user, array) && !root->isAncestor(user));
          });
 }
 

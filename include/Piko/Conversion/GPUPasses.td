@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Passes that make grids of kernels, in the order in which they run.
+// Passes that make grids of kernels, in the order in which they run, which is why
+// they are in one file.
 
 #ifndef PIKO_CONVERSION_GPUPASSES_TD
 #define PIKO_CONVERSION_GPUPASSES_TD

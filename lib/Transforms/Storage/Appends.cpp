@@ -39,7 +39,6 @@ private:
   }
   bool follow(OpOperand &handedOn);
   bool setNext(Operation *sum, OpOperand &handedOn, Value when);
-  bool findStores();
   bool addIndex(Operation *cast);
   bool addStore(memref::StoreOp store);
   bool setLimit(arith::CmpIOp compare);
@@ -536,74 +535,5 @@ void PushLoop::erase() {
   while (op && op != before && isOpTriviallyDead(op)) {
     op->erase();
     op = original->getPrevNode();
-  }
-}
-
-//===----------------------------------------------------------------------===//
-// Lists
-//===----------------------------------------------------------------------===//
-
-/// Whether what stands in an array is what a push has put there, if anything:
-/// it alone fills it, in one loop that runs once.
-static bool isFilledOnce(PushOp push, Value array, scf::ForOp loop) {
-  for (Operation *user : array.getUsers())
-    if (user != push && !isa<memref::LoadOp>(user))
-      return false;
-  Block *block = array.getParentBlock();
-  for (Operation *at = loop; at->getBlock() != block;) {
-    at = at->getParentOp();
-    if (!isa_and_nonnull<scf::IfOp>(at))
-      return false;
-  }
-  return true;
-}
-
-void piko::padLists(scf::ForOp loop, int64_t laneCount) {
-  loop.walk([&](PushOp push) {
-    if (!llvm::all_of(push.getArrays(), [&](Value array) {
-          return isFilledOnce(push, array, loop);
-        }))
-      return;
-    for (Value array : push.getArrays()) {
-      MemRefType type = cast<MemRefType>(array.getType());
-      array.setType(MemRefType::get({type.getNumElements() + laneCount},
-                                    type.getElementType()));
-    }
-    push.setPadded(true);
-  });
-}
-
-void piko::explainNoPushes(InFlightDiagnostic &remark, Location refusal) {
-  remark << "this loop appends one element after the other";
-  remark.attachNote(refusal)
-      << "here a list, or its length, is used for something else";
-}
-
-void piko::expandPushes(scf::ForOp loop) {
-  SmallVector<PushOp> pushes;
-  loop.walk([&](PushOp push) { pushes.push_back(push); });
-  for (PushOp push : pushes) {
-    OpBuilder builder(push);
-    CodeBuilder at(builder, push.getLoc());
-    Value zero = at.index(0), count = at.load(push.getCount(), zero);
-    auto write = [&] {
-      Type index = builder.getIndexType();
-      Value place = count;
-      if (!count.getType().isIndex())
-        place =
-            arith::IndexCastOp::create(builder, push.getLoc(), index, count);
-      at.store(push.getValues(), push.getArrays(), place);
-      Value one = arith::ConstantOp::create(
-          builder, push.getLoc(), builder.getIntegerAttr(count.getType(), 1));
-      at.store(at.add(count, one), push.getCount(), zero);
-    };
-    if (Value limit = push.getLimit())
-      at.when(at.compare(push.getIsUnsigned() ? CodeBuilder::P::ult
-                                              : CodeBuilder::P::slt,
-                         count, limit),
-              write);
-    else
-      write();
-    push.erase();
   }
 }

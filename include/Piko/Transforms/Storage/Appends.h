@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // Stream compaction that a text writes itself: a loop that appends to lists,
-// `if (test) list[count++] = i`.
+// `if (test) list[count++] = i`. Appends.cpp finds such loops, and has copies
+// of them push; Pushes.cpp is about what pushes.
 
 #ifndef PIKO_TRANSFORMS_STORAGE_APPENDS_H
 #define PIKO_TRANSFORMS_STORAGE_APPENDS_H
@@ -17,13 +18,14 @@ namespace piko {
 struct PushLoop {
   mlir::scf::ForOp loop;
   mlir::Operation *original = nullptr;
-  mlir::Operation *before = nullptr; ///< All of this; or null.
+  /// What preceded the original, and all that was made; null: nothing.
+  mlir::Operation *before = nullptr;
   /// Instead of the results of the loop that it was made of.
   llvm::SmallVector<mlir::Value> results;
   /// What stands around it for them, in order.
   llvm::SmallVector<mlir::Operation *> helpers;
 
-  /// Of what is not needed.
+  /// Undoes all of it: the original stays.
   void erase();
 };
 

@@ -4,13 +4,10 @@
 // lists, by stream compaction. Strips of iterations find out at once whether
 // they append; a prefix sum says where.
 
-#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Conversion/Passes.h"
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Transforms/Storage/Appends.h"
-#include "Piko/Transforms/Storage/CountedWhiles.h"
 
-#include "mlir/IR/IRMapping.h"
 #include "mlir/IR/Matchers.h"
 
 namespace piko {
