@@ -14,6 +14,9 @@
 #                    card, by estimates (GPU_BENCH=--quick; docs/GPU.md)
 # And for a machine with a card that has nothing else:
 #   make gpu-kit     packs BUILD/gpu-kit.tar.zst, which takes ten minutes
+# For who gives Piko to others:
+#   make packages        Debian packages, in a minute
+#   make package-check   installs and uses them on a bare Debian 12
 # The rest is a thin layer over the presets of CMakePresets.json.
 
 PRESET ?= release
@@ -29,8 +32,8 @@ UNITE ?= ON
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: all bench bench-gate build charts check check-all clean configure demo deps \
-  docs format gpu-bench gpu-kit lanes lint
+.PHONY: abi all bench bench-gate build charts check check-all clean configure demo deps \
+  docs format gpu-bench gpu-kit lanes lint package-check packages
 
 all: build
 
@@ -114,6 +117,23 @@ format:
 lanes: configure
 	@cmake --build $(BUILD) --parallel $(JOBS) --target pikoc
 	@test/mappings/lanes.py --pikoc $(BUILD)/bin/pikoc --write
+
+# Debian packages, in BUILD/packages; see cmake/PikoPackages.cmake.
+packages: build
+	@utils/install-deps.sh utils/packages-package.txt
+	@rm -f $(BUILD)/packages/*.deb
+	@cd $(BUILD) && cpack
+	@ls $(CURDIR)/$(BUILD)/packages/*.deb
+
+# Installs them on a bare Debian 12, and does there what their users do; as root.
+package-check: packages
+	@utils/check-packages.sh $(BUILD)/packages
+
+# What the runtime's library promises, where its version allows.
+abi: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target pikort
+	@runtime/test/abi/abi.py --library $(BUILD)/lib/libpikort.so \
+	  --include runtime/include --write
 
 docs: deps
 	@utils/make-reference.py

@@ -3,26 +3,28 @@
 # Flags that every target of the project is built with.
 add_library(piko_options INTERFACE)
 target_compile_options(piko_options INTERFACE
-  -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wno-unused-parameter;-ffp-contract=off>")
 
 if(PIKO_ENABLE_COMPILER)
   # What a target that uses LLVM, MLIR or Clang needs.
   add_library(piko_llvm INTERFACE)
   target_include_directories(piko_llvm SYSTEM INTERFACE ${LLVM_INCLUDE_DIRS} ${MLIR_INCLUDE_DIRS})
   target_include_directories(piko_llvm INTERFACE
-    ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   separate_arguments(PIKO_LLVM_DEFINITIONS NATIVE_COMMAND "${LLVM_DEFINITIONS}")
   target_compile_definitions(piko_llvm INTERFACE ${PIKO_LLVM_DEFINITIONS})
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
     # It compiles in half of the time of -O3, and the compiler is as fast: what
     # takes its time are LLVM's libraries. PIKO_OPTIMIZATION: another level.
     set(level $<TARGET_PROPERTY:PIKO_OPTIMIZATION>)
-    target_compile_options(piko_llvm INTERFACE
-      $<$<COMPILE_LANGUAGE:CXX>:-O$<IF:$<STREQUAL:${level},>,1,${level}>>)
+    set(flags -O$<IF:$<STREQUAL:${level},>,1,${level}>)
   else()
-    target_compile_options(piko_llvm INTERFACE
-      $<$<COMPILE_LANGUAGE:CXX>:SHELL:-include ${CMAKE_CURRENT_LIST_DIR}/LLVMStatistics.h>)
+    set(flags "SHELL:-include ${CMAKE_CURRENT_LIST_DIR}/LLVMStatistics.h")
   endif()
+  target_compile_options(piko_llvm INTERFACE
+    "$<BUILD_INTERFACE:$<$<COMPILE_LANGUAGE:CXX>:${flags}>>")
   if(NOT LLVM_ENABLE_RTTI)
     target_compile_options(piko_llvm INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>)
   endif()

@@ -1,43 +1,93 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #
-# What `cmake --install` copies, and the package that find_package(Piko) finds
-# in the build tree and in the installed one.
+# What `cmake --install` copies, by component, and the package that find_package(Piko)
+# finds in the build tree and in the installed one, wherever that is moved to.
+#
+#   runtime        libpikort
+#   development    pikort's headers and the dialect's, the CMake package, static
+#                  libraries of the compiler
+#   tools          pikoc, piko-render, ..., and piko.h, which they read
+#   documentation  documents and the examples
 include(CMakePackageConfigHelpers)
-include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Piko)
 set(build_package_dir ${PROJECT_BINARY_DIR}/lib/cmake/Piko)
+# What only the tools load.
+set(module_dir ${CMAKE_INSTALL_LIBDIR}/piko/modules)
 
+# Who makes packages of the components, PikoPackages.cmake, finds here which there are.
+set(PIKO_COMPONENTS runtime development documentation)
 set_target_properties(pikort PROPERTIES EXPORT_NAME runtime)
-install(TARGETS pikort EXPORT PikoTargets)
-install(DIRECTORY runtime/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(TARGETS pikort EXPORT PikoTargets
+  LIBRARY COMPONENT runtime NAMELINK_COMPONENT development)
+install(DIRECTORY runtime/include/pikort DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  COMPONENT development)
+# The tools read what pipelines include.
+install(FILES runtime/include/piko.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT tools)
+install(DIRECTORY runtime/include/piko DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  COMPONENT tools)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
+install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation
+  REGEX "examples/[a-z]+/CMakeLists.txt$" EXCLUDE
+  REGEX "examples/CMakeLists.txt$" EXCLUDE)
+install(FILES README.md CHANGELOG.md SECURITY.md CITATION.cff
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
+# A Debian package has it in its own form.
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)
+
 if(PIKO_ENABLE_COMPILER)
-  set(tools piko-diff piko-render piko-translate piko-tune)
+  list(APPEND PIKO_COMPONENTS tools)
+  set(PIKO_TOOLS pikoc piko-diff piko-render piko-render-library piko-translate piko-tune)
   if(PIKO_ENABLE_GPU)
-    list(APPEND tools piko-opt)
+    list(APPEND PIKO_TOOLS piko-opt)
   endif()
   if(PIKO_ENABLE_ASSIMP)
-    list(APPEND tools piko-import)
+    list(APPEND PIKO_TOOLS piko-import)
   endif()
-  set_target_properties(pikoc ${tools} PROPERTIES
-    INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR};${PIKO_LLVM_PREFIX}/lib")
-  install(TARGETS pikoc EXPORT PikoTargets)
-  install(TARGETS ${tools})
-  install(TARGETS PikoBvh LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  set_target_properties(${PIKO_TOOLS} PROPERTIES INSTALL_RPATH
+    "$ORIGIN/../${CMAKE_INSTALL_LIBDIR};$ORIGIN/../${module_dir};${PIKO_LLVM_PREFIX}/lib")
+  install(TARGETS ${PIKO_TOOLS} EXPORT PikoTargets RUNTIME COMPONENT tools)
+  set(modules PikoBvh)
   if(PIKO_ENABLE_OPENIMAGEIO)
-    install(TARGETS PikoImage LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+    list(APPEND modules PikoImage)
   endif()
+  install(TARGETS ${modules} LIBRARY DESTINATION ${module_dir} COMPONENT tools)
+
+  # What somebody else's passes and tools are made with.
+  set(libraries PikoAnalysis PikoCompilerBuild PikoConversion PikoDialect PikoDriver
+    PikoFrontend PikoLibraryLoader PikoRegistration PikoReplay PikoSupport PikoTargetCPU
+    PikoTargetGraphviz PikoTargetSupport PikoTransforms)
+  if(PIKO_ENABLE_GPU)
+    list(APPEND libraries PikoConversionGPU PikoTargetNVPTX)
+  endif()
+  foreach(library ${libraries})
+    string(REGEX REPLACE "^Piko" "" name ${library})
+    set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
+  endforeach()
+  foreach(part options llvm clang)
+    set_target_properties(piko_${part} PROPERTIES EXPORT_NAME ${part})
+  endforeach()
+  install(TARGETS ${libraries} piko_options piko_llvm piko_clang
+    EXPORT PikoDialectTargets ARCHIVE COMPONENT development)
+  foreach(headers ${PROJECT_SOURCE_DIR}/include/Piko ${PROJECT_BINARY_DIR}/include/Piko)
+    install(DIRECTORY ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+      COMPONENT development
+      FILES_MATCHING PATTERN "*.h" PATTERN "*.td" PATTERN "*.h.inc"
+      PATTERN CMakeFiles EXCLUDE)
+  endforeach()
+  install(EXPORT PikoDialectTargets NAMESPACE Piko:: DESTINATION ${package_dir}
+    COMPONENT development)
+  export(EXPORT PikoDialectTargets NAMESPACE Piko::
+    FILE ${build_package_dir}/PikoDialectTargets.cmake)
 endif()
 
-install(EXPORT PikoTargets NAMESPACE Piko:: DESTINATION ${package_dir})
+install(EXPORT PikoTargets NAMESPACE Piko:: DESTINATION ${package_dir}
+  COMPONENT development)
 export(EXPORT PikoTargets NAMESPACE Piko::
   FILE ${build_package_dir}/PikoTargets.cmake)
 
 configure_package_config_file(cmake/PikoConfig.cmake.in
   ${build_package_dir}/PikoConfig.cmake
-  INSTALL_DESTINATION ${package_dir} NO_SET_AND_CHECK_MACRO
-  NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+  INSTALL_DESTINATION ${package_dir} NO_SET_AND_CHECK_MACRO)
 write_basic_package_version_file(${build_package_dir}/PikoConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 configure_file(cmake/PikoAddPipeline.cmake ${build_package_dir} COPYONLY)
@@ -45,4 +95,4 @@ install(FILES
   ${build_package_dir}/PikoConfig.cmake
   ${build_package_dir}/PikoConfigVersion.cmake
   cmake/PikoAddPipeline.cmake
-  DESTINATION ${package_dir})
+  DESTINATION ${package_dir} COMPONENT development)

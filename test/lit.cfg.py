@@ -25,6 +25,7 @@ split-file. Substitutions:
   %cxx_quick_host
                  the same after the precompiled header that such a host includes
   %link_host     what such a host links
+  %llvm_lib      folder of LLVM's libraries
   %qt_include    folder of Qt's headers
   %test_driver   the driver for tests, in place of NVIDIA's
   %test_driver_11  the same without what came with CUDA 12
@@ -174,6 +175,7 @@ config.substitutions += [
     ("%cxx_host", " ".join(host)),
     ("%cxx_quick_host", " ".join(quick_host)),
     ("%link_host", " ".join(link_host)),
+    ("%llvm_lib", os.path.dirname(config.openmp_runtime)),
     ("%cxx_reference", " ".join(reference)),
     ("%cxx_after_header", " ".join(after_header)),
     ("%cxx_ptx", " ".join(ptx)),

@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+#
+# check-packages.sh [--folder FOLDER] [--keep] PACKAGES
+#
+# Installs the Debian packages of a folder, as `make packages` leaves them, on a bare
+# Debian 12, and does there what their users do: builds the tutorial's application and
+# the project of docs/OutOfTree.md by the documents' own commands, renders the bunny, and
+# takes the packages away again. Lintian looks at them, too. As root or through sudo; also `make package-check`.
+#
+#   --folder FOLDER  where its root is made (a new folder of the temporary ones)
+#   --keep           leaves it there; with --folder the next run goes on with it
+set -euo pipefail
+source="$(cd "$(dirname "$0")/.." && pwd)"
+# shellcheck source=utils/bare-root.sh
+. "$source/utils/bare-root.sh"
+
+folder='' keep=''
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --folder)
+      [ $# -gt 1 ] || fail "option '$1' lacks its value"
+      folder="$2"
+      shift 2
+      ;;
+    --keep) keep=1 && shift ;;
+    --help) sed -n '4,/^set/{/^#/s/^# \{0,1\}//p}' "$0" && exit ;;
+    -*) fail "unknown option '$1'" ;;
+    *) break ;;
+  esac
+done
+[ $# -eq 1 ] || fail "expected the folder of the packages"
+packages=("$1"/*.deb)
+[ -e "${packages[0]}" ] || fail "expected packages in '$1'; make packages makes them"
+as_root ${folder:+--folder "$folder"} ${keep:+--keep} "$1"
+
+step() {
+  echo "check-packages: $1"
+  inside "set -euo pipefail; cd /checked; $2"
+}
+
+open_root
+rm -rf "$root/checked"
+mkdir "$root/checked" "$root/checked/packages"
+cp "${packages[@]}" "$root/checked/packages"
+cp "$source/utils/check-tutorial.py" "$root/checked"
+readonly install='env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends'
+readonly doc=/usr/share/doc/piko
+
+step 'install' "apt-get update -q; $install --allow-downgrades --reinstall ./packages/*.deb"
+step 'every library is found' \
+  'for file in /usr/bin/piko* /usr/lib/libpikort.so.* /usr/lib/piko/modules/*.so; do
+     ! ldd "$file" | grep "not found"
+   done'
+step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev \
+  glmark2-data lintian"
+
+step 'an application, as the tutorial makes it' \
+  "python3 check-tutorial.py --piko /usr --work tutorial $doc/docs/Tutorial.md"
+step 'a pass out of tree' \
+  "cp -r $doc/examples/out-of-tree .
+   cp tutorial/spheres.piko.cpp out-of-tree
+   awk '/^\`\`\`sh/ {inside = 1; next} /^\`\`\`/ {inside = 0} inside' \
+     $doc/docs/OutOfTree.md >out-of-tree/commands.sh
+   (cd out-of-tree && PIKO=/usr sh -e commands.sh)
+   grep -q 'bins \[16, 16\]' out-of-tree/larger.mlir"
+step 'the bunny' \
+  "piko-render $doc/examples/raster/raster.piko.cpp --pipe Fused \
+     /usr/share/glmark2/models/bunny.obj --width 1024 --height 768 --out bunny.png
+   piko-render $doc/examples/raster/raster.piko.cpp --pipe Fused \
+     /usr/share/glmark2/models/bunny.obj --width 1024 --height 768 --out reference.png \
+     --target reference --warmup 0 --frames 1
+   piko-diff reference.png bunny.png --fail-above 0"
+step 'lintian' "lintian --no-tag-display-limit --fail-on error,warning \
+  --allow-root packages/*.deb"
+step 'take them away' \
+  'names=$(for file in packages/*.deb; do dpkg-deb --field "$file" Package; done)
+   apt-get purge -q -y $names
+   ! ls -d /usr/bin/piko* /usr/include/piko* /usr/include/Piko /usr/lib/libpiko* \
+     /usr/lib/piko /usr/lib/cmake/Piko /usr/share/doc/*piko* 2>/dev/null'
+echo "check-packages: all is well"
