@@ -50,6 +50,33 @@ if(PIKO_ENABLE_COMPILER)
   if(PIKO_ENABLE_OPENIMAGEIO)
     list(APPEND modules PikoImage)
   endif()
+  # From the tables of options that the tools have.
+  find_package(Python3 COMPONENTS Interpreter)
+  if(Python3_Interpreter_FOUND)
+    set(manuals ${PROJECT_BINARY_DIR}/manuals)
+    set(make_manuals ${PROJECT_SOURCE_DIR}/utils/make-manuals.py)
+    set(documented ${PIKO_TOOLS})
+    list(REMOVE_ITEM documented piko-render-library) # it says what piko-render does
+    set(files "")
+    foreach(tool ${documented})
+      list(APPEND files $<TARGET_FILE:${tool}>)
+    endforeach()
+    add_custom_command(OUTPUT ${manuals}/done
+      COMMAND Python3::Interpreter ${make_manuals} --out ${manuals} ${files}
+      COMMAND ${CMAKE_COMMAND} -E touch ${manuals}/done
+      DEPENDS ${documented} ${make_manuals}
+      COMMENT "Writing manual pages and completions" VERBATIM)
+    add_custom_target(manuals ALL DEPENDS ${manuals}/done)
+    install(DIRECTORY ${manuals}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT tools)
+    install(DIRECTORY ${manuals}/bash/
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT tools)
+    install(DIRECTORY ${manuals}/zsh/
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions COMPONENT zsh)
+    # Where Debian's packages have it.
+    install(DIRECTORY ${manuals}/zsh/
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions
+      COMPONENT tools EXCLUDE_FROM_ALL)
+  endif()
   install(TARGETS ${modules} LIBRARY DESTINATION ${module_dir} COMPONENT tools)
 
   # What somebody else's passes and tools are made with.

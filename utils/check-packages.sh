@@ -5,8 +5,9 @@
 #
 # Installs the Debian packages of a folder, as `make packages` leaves them, on a bare
 # Debian 12, and does there what their users do: builds the tutorial's application and
-# the project of docs/OutOfTree.md by the documents' own commands, renders the bunny, and
-# takes the packages away again. Lintian looks at them, too. As root or through sudo; also `make package-check`.
+# the project of docs/OutOfTree.md by the documents' own commands, renders the bunny, reads
+# a manual page, completes a command line, and takes the packages away again. Lintian
+# looks at them, too. As root or through sudo; also `make package-check`.
 #
 #   --folder FOLDER  where its root is made (a new folder of the temporary ones)
 #   --keep           leaves it there; with --folder the next run goes on with it
@@ -53,7 +54,7 @@ step 'every library is found' \
      ! ldd "$file" | grep "not found"
    done'
 step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev \
-  glmark2-data lintian"
+  glmark2-data man-db bash-completion zsh lintian"
 
 step 'an application, as the tutorial makes it' \
   "python3 check-tutorial.py --piko /usr --work tutorial $doc/docs/Tutorial.md"
@@ -71,6 +72,14 @@ step 'the bunny' \
      /usr/share/glmark2/models/bunny.obj --width 1024 --height 768 --out reference.png \
      --target reference --warmup 0 --frames 1
    piko-diff reference.png bunny.png --fail-above 0"
+step 'manual pages and completion' \
+  "man --warnings -E UTF-8 -l /usr/share/man/man1/pikoc.1.gz 2>&1 >pikoc.txt | (! grep .)
+   grep -q -e --header pikoc.txt
+   for file in /usr/share/zsh/vendor-completions/_piko*; do zsh -n \"\$file\"; done
+   bash -c '. /usr/share/bash-completion/bash_completion
+     _completion_loader pikoc || true
+     COMP_WORDS=(pikoc --targ) COMP_CWORD=1
+     _pikoc; echo \"\${COMPREPLY[@]}\"' | grep -qx -e --target"
 step 'lintian' "lintian --no-tag-display-limit --fail-on error,warning \
   --allow-root packages/*.deb"
 step 'take them away' \

@@ -3,64 +3,31 @@
 #include "Piko/CommandLine/CommandLine.h"
 
 #include <algorithm>
-#include <sstream>
+#include <iterator>
 
 using namespace piko;
 
-namespace {
-
-/// The help as all tools of Piko's write it.
-class Formatter : public CLI::Formatter {
-public:
-  explicit Formatter(std::string usage) : usage(std::move(usage)) {
-    column_width(25);
-  }
-
-  std::string make_usage(const CLI::App *, std::string) const override {
-    return "\nusage: " + usage + "\n";
-  }
-  std::string make_option_opts(const CLI::Option *option) const override {
-    const std::string &value = option->get_option_text();
-    return value.empty() || value.starts_with('[') ? value : " " + value;
-  }
-  std::string make_option_desc(const CLI::Option *option) const override {
-    return wrap(option->get_description(), 80 - get_column_width());
-  }
-  std::string make_description(const CLI::App *app) const override {
-    return wrap(app->get_description(), 80) + "\n";
-  }
-
-private:
-  static std::string wrap(const std::string &text, size_t width) {
-    std::string lines;
-    size_t column = 0;
-    std::istringstream words(text);
-    for (std::string word; words >> word; column += word.size()) {
-      bool fits = column + 1 + word.size() <= width;
-      if (!lines.empty())
-        lines += fits ? ' ' : '\n';
-      column = fits ? column + !lines.empty() : 0;
-      lines += word;
-    }
-    return lines;
-  }
-
-  std::string usage;
-};
-
-} // namespace
-
 CommandLine::CommandLine(const std::string &usage,
-                         const std::string &description)
-    : App(description) {
-  formatter(std::make_shared<Formatter>(usage));
-  set_help_flag("-h,--help", "print this");
-  allow_extras();
+                         const std::string &description,
+                         const std::string &example)
+    : App(description), tool{usage, description, example, {}} {
   beginGroup("Options");
+  set_help_flag("-h,--help", "print what fits a screen");
+  set_help_all_flag("--help-all", "print this");
+  set_version_flag("--version", printVersion(tool.getName()),
+                   "print the version");
+  add_flag_callback("--help-json", [this] {
+    throw CLI::CallForVersion(printHelpAsJson(describe()), 0);
+  })->group("");
+  allow_extras();
 }
 
 void CommandLine::beginGroup(const std::string &name) {
   option_defaults()->group(name);
+}
+
+void CommandLine::setBrief(const std::string &name, const std::string &brief) {
+  briefs[name] = brief;
 }
 
 CLI::Option *CommandLine::addValues(const std::string &name,
@@ -120,12 +87,90 @@ CLI::Option *CommandLine::addOptional(const std::string &name,
       ->expected(0);
 }
 
+CLI::Option *CommandLine::addChoice(const std::string &name,
+                                    const std::string &value,
+                                    std::vector<Choice> choices, Action action,
+                                    const std::string &description) {
+  auto take = [=](const std::string &word) {
+    std::string words;
+    for (const Choice &choice : choices) {
+      if (choice.word == word)
+        return action(word);
+      words += (&choice == &choices[0]       ? ""
+                : &choice == &choices.back() ? " or "
+                                             : ", ") +
+               choice.word;
+    }
+    throw wrong(name, "expected " + words + ", but got '" + word + "'");
+  };
+  CLI::Option *option = addText(name, value, take, description);
+  choicesOf[option] = std::move(choices);
+  return option;
+}
+
+ToolHelp CommandLine::describe() const {
+  ToolHelp result = tool;
+  for (const CLI::Option *option :
+       get_options([](const CLI::Option *it) { return true; })) {
+    if (option->get_group().empty())
+      continue;
+    OptionHelp help;
+    for (const std::string &name : option->get_snames())
+      help.names.push_back("-" + name);
+    for (const std::string &name : option->get_lnames())
+      help.names.push_back("--" + name);
+    help.isPositional = option->get_positional();
+    if (help.isPositional)
+      help.names.push_back(option->get_name(true));
+    help.value = option->get_option_text();
+    help.takesValue = help.isPositional || !help.value.empty();
+    help.description = option->get_description();
+    help.group = help.isPositional ? "Arguments" : option->get_group();
+    for (const std::string &name : help.names)
+      if (auto brief = briefs.find(name); brief != briefs.end())
+        help.brief = brief->second;
+    if (auto choices = choicesOf.find(option); choices != choicesOf.end())
+      help.choices = choices->second;
+    result.options.push_back(std::move(help));
+  }
+  // What is asked for in place of the tool's work comes last.
+  auto rank = [](const OptionHelp &option) {
+    const std::string &name = option.names.back();
+    bool isAsked = name.starts_with("--help") || name == "--version";
+    return option.isPositional ? 0 : isAsked ? 2 : 1;
+  };
+  std::vector<OptionHelp> ordered;
+  for (int i = 0; i < 3; ++i)
+    std::copy_if(result.options.begin(), result.options.end(),
+                 std::back_inserter(ordered),
+                 [&](const OptionHelp &it) { return rank(it) == i; });
+  result.options = std::move(ordered);
+  return result;
+}
+
+support::Error CommandLine::refuse(const std::string &word) const {
+  bool isOption = word.size() > 1 && word[0] == '-';
+  if (!isOption)
+    return support::Error{"unexpected argument '" + word + "'"};
+  std::vector<std::string> names;
+  for (const OptionHelp &option : describe().options)
+    names.insert(names.end(), option.names.begin(), option.names.end());
+  std::string nearest = findNearest(word.substr(0, word.find('=')), names);
+  return support::Error{
+      "unknown option '" + word + "'; " +
+      (nearest.empty() ? "see --help" : "did you mean '" + nearest + "'?")};
+}
+
 support::Result<std::string> CommandLine::read(Words words) {
   std::reverse(words.begin(), words.end()); // as CLI11 takes them
   try {
     parse(std::move(words));
   } catch (const CLI::CallForHelp &) {
-    return help();
+    return printShortHelp(describe());
+  } catch (const CLI::CallForAllHelp &) {
+    return printLongHelp(describe());
+  } catch (const CLI::CallForVersion &asked) {
+    return std::string(asked.what());
   } catch (const CLI::ArgumentMismatch &error) {
     std::string message = error.what();
     return support::Error{"option '" + message.substr(0, message.find(':')) +
@@ -134,10 +179,7 @@ support::Result<std::string> CommandLine::read(Words words) {
     return support::Error{error.what()};
   }
   if (Words extras = remaining(); !extras.empty())
-    return support::Error{(extras[0].size() > 1 && extras[0][0] == '-'
-                               ? "unknown option '"
-                               : "unexpected argument '") +
-                          extras[0] + "'"};
+    return refuse(extras[0]);
   return std::string();
 }
 

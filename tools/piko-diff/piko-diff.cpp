@@ -32,7 +32,8 @@ Result<Options> parseOptions(const std::vector<std::string> &words) {
       "display shows them: the largest, the mean and the root mean square "
       "absolute difference, the 99th percentile of pixels, PSNR in dB, and the "
       "mean of FLIP, which predicts what an observer notices. Black to white "
-      "is 1. Colours are taken as the files have them; alpha is not compared.");
+      "is 1. Colours are taken as the files have them; alpha is not compared.",
+      "piko-diff reference.png image.png --fail-above 0");
   Options options;
   CLI::Option *files[] = {
       line.addText("REFERENCE", "", options.reference, "what is right"),

@@ -2,6 +2,7 @@
 //
 // Runs passes on `.mlir` files.
 
+#include "Piko/CommandLine/Help.h"
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/PassReport.h"
 #include "Piko/Driver/Registration.h"
@@ -17,6 +18,38 @@
 #include "llvm/Support/ToolOutputFile.h"
 
 using namespace mlir;
+
+static const piko::ToolHelp help{
+    .usage = "piko-opt [options] FILE.mlir|-",
+    .description = "Runs passes on .mlir files, in the order in which they are "
+                   "named.",
+    .example = "piko-opt dots.mlir --piko-synthesize --piko-to-machine",
+    .options = {{.names = {"-o"}, .value = "FILE", .brief = "where to write"},
+                {.names = {"--pass-pipeline"},
+                 .value = "TEXT",
+                 .brief = "passes with their options and nesting"},
+                {.names = {"--piko-synthesize"},
+                 .brief = "from the authored to the kernels level"},
+                {.names = {"--piko-to-machine"},
+                 .brief = "from there to the machine's"},
+                {.names = {"--piko-to-cpu"},
+                 .brief = "from there to upstream dialects"},
+                {.names = {"--piko-cpu-to-llvm"},
+                 .brief = "from there to llvm and omp"},
+                {.names = {"--piko-to-gpu"},
+                 .brief = "from the machine level to kernels for a GPU"},
+                {.names = {"--report-passes=text|json"},
+                 .brief = "which passes changed anything"},
+                {.names = {"--mlir-print-ir-after-all"},
+                 .brief = "the module after each pass"},
+                {.names = {"--mlir-timing"}, .brief = "the time of each pass"},
+                {.names = {"--split-input-file"},
+                 .brief = "each part between // ----- by itself"},
+                {.names = {"--verify-diagnostics"},
+                 .brief = "compare with expected-error and others"},
+                {.names = {"--show-dialects"},
+                 .brief = "which dialects there are"}},
+    .isLLVMs = true};
 
 enum class ReportFormat { None, Text, JSON };
 
@@ -36,7 +69,7 @@ static LogicalResult runWithReport(const std::string &input,
   auto from = openInputFile(input, &error);
   auto to = from ? openOutputFile(output, &error) : nullptr;
   if (!from || !to) {
-    llvm::errs() << error << "\n";
+    llvm::errs() << "piko-opt: error: " << error << "\n";
     return failure();
   }
   if (failed(MlirOptMain(to->os(), std::move(from), registry, config)))
@@ -84,5 +117,7 @@ static int optimize(int argc, char **argv) {
 
 int main(int argc, char **argv) {
   piko::support::reportOutOfMemory("piko-opt");
+  if (piko::answerHelp(help, argc, argv))
+    return 0;
   return piko::runMainOnDeepStack([&] { return optimize(argc, argv); });
 }

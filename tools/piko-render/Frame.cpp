@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Frame.h"
 
+#include "Piko/CommandLine/Messages.h"
+#include "Piko/CommandLine/Progress.h"
 #include "Piko/Replay/CaptureFile.h"
-#include "Piko/Scene/ProgressBar.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -35,7 +36,7 @@ static Result<SceneInput> loadCapture(const Options &options) {
 Result<SceneInput> render::loadScene(const Options &options) {
   if (replay::isCaptureFile(options.scene))
     return loadCapture(options);
-  ProgressBar bar("loading");
+  Progress bar("loading " + options.scene);
   auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
   if (!mesh)
     return mesh.error();
@@ -137,14 +138,15 @@ Result<std::vector<scene::Color>> render::readImage(pikort_pipeline *pipeline,
 Result<Frame> Frame::load(const Options &options, bool wasCompiled) {
   std::string diagnostics;
   Frame frame;
-  frame.program = loadPipeline(options.pipeline, options.load, diagnostics);
+  {
+    Progress progress("compiling " + options.pipeline);
+    frame.program = loadPipeline(options.pipeline, options.load, diagnostics);
+  }
   if (!frame.program && diagnostics.empty())
     return Error{"cannot load pipeline '" + options.pipeline + "'"};
   if (frame.program && wasCompiled)
     return frame;
-  std::fputs(diagnostics.c_str(), stderr);
-  if (!diagnostics.empty() && diagnostics.back() != '\n')
-    std::fputc('\n', stderr);
+  std::fputs(addToolName("piko-render", diagnostics).c_str(), stderr);
   if (!frame.program)
     return Error{}; // already said
   return frame;

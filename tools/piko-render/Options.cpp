@@ -15,13 +15,8 @@ const std::string ofScenes = "Of scenes only";
 void setTarget(const std::string &name, LoadOptions &load) {
   load.target =
       name == "reference" ? ExecutionTarget::Reference : ExecutionTarget::CPU;
-  auto target = name == "reference" ? GPUTarget::None : parseGPUTarget(name);
-  if (!target)
-    throw CommandLine::wrong(
-        "--target",
-        "expected cpu, cuda, auto, gpu-on-cpu or reference, but got '" + name +
-            "'");
-  load.gpu.target = *target;
+  load.gpu.target =
+      name == "reference" ? GPUTarget::None : *parseGPUTarget(name);
 }
 
 void setLevel(const std::string &text, LoadOptions &load) {
@@ -94,12 +89,15 @@ void addDistance(CommandLine &line, const std::string &name,
 
 void addCompilerOptions(CommandLine &line, Options &options) {
   LoadOptions &load = options.load;
-  line.addText(
+  line.addChoice(
       "--target", "TARGET",
+      {{"cpu", "compiled for this machine"},
+       {"cuda", "for an NVIDIA GPU"},
+       {"auto", "for that where there is one"},
+       {"gpu-on-cpu", "for a GPU that this machine emulates"},
+       {"reference", "run by the reference executor"}},
       [&](const std::string &text) { setTarget(text, load); },
-      "cpu: compiled for this machine; cuda: for an NVIDIA GPU; auto: for that "
-      "where there is one; gpu-on-cpu: for a GPU that this machine emulates; "
-      "reference: run by the reference executor (cpu)");
+      "what the pipeline runs on (cpu):");
   line.addText(
       "-O", "LEVEL", [&](const std::string &text) { setLevel(text, load); },
       "-O0 to -O3: how much to optimise; the reference executor at most as "
@@ -110,18 +108,10 @@ void addCompilerOptions(CommandLine &line, Options &options) {
       "scalar loops: measured (the faster), expected (by estimates), vectors "
       "or scalar; or, behind one of these, KERNEL:NUMBER=vectors, ...; all "
       "results are the same ($PIKO_MAPPINGS; measured)");
-  line.addText(
-      "--mapping-window", "F",
-      [&](const std::string &text) {
-        double factor =
-            CommandLine::readNumber<double>("--mapping-window", text);
-        if (factor < 1 || factor > 1000)
-          throw CommandLine::wrong("--mapping-window",
-                                   "expected a factor in [1, 1000]");
-        load.synthesis.mappingWindow = factor;
-      },
-      "hold both versions where estimates are within this factor of each "
-      "other; 1: nowhere (2)");
+  line.addNumber("--mapping-window", "F", load.synthesis.mappingWindow,
+                 "hold both versions where estimates are within this factor of "
+                 "each other; 1: nowhere (2)",
+                 1, 1000);
   addNames(line, "--fix", "NAME,...", options.fix,
            "specialize the pipeline for values that the scene has: CONSTANT, "
            "BUFFER.size, all (all constants but cameras, and sizes of small "
@@ -188,9 +178,34 @@ void addRunOptions(CommandLine &line, Options &options) {
                 "name the frame's three largest wastes, and what would remove "
                 "them");
   line.add_flag("--json", options.json, "print one line of JSON");
+  line.add_flag("--quiet", options.quiet,
+                "print nothing at the end but what other options ask for");
   line.add_flag("--kernel-times", options.kernelTimes,
                 "for cuda, with --json: what kernels take, in frames of their "
                 "own, whose grids are launched one by one");
+}
+
+void addBriefs(CommandLine &line) {
+  line.setBrief("--pipe", "which pipeline of the file (the only one)");
+  line.setBrief("--target", "cpu, cuda, auto, gpu-on-cpu or reference (cpu)");
+  line.setBrief("--out", "write the picture: .png, .exr, .ppm, ...");
+  line.setBrief("--width", "pixels of a row (1024)");
+  line.setBrief("--height", "rows (768)");
+  line.setBrief("--eye", "where the camera is");
+  line.setBrief("--at", "where it looks");
+  line.setBrief("--lights", "number of lights (1)");
+  line.setBrief("--ground", "put a square under the scene");
+  line.setBrief("--set", "a constant of the pipeline");
+  line.setBrief("--threads", "threads, 0 for all (0)");
+  line.setBrief("--frames", "timed frames (30)");
+  line.setBrief("--against", "compare with these targets, bit for bit");
+  line.setBrief("--check", "check the rules of state");
+  line.setBrief("--tuned", "a setting of piko-tune's");
+  line.setBrief("--fix", "specialize for values of the scene");
+  line.setBrief("--explain", "the three largest wastes of a frame");
+  line.setBrief("--trace", "which thread ran which bins when");
+  line.setBrief("--json", "print one line of JSON");
+  line.setBrief("--quiet", "print nothing at the end");
 }
 
 /// What is wrong with options that are fine one by one; empty if nothing.
@@ -281,19 +296,21 @@ std::string render::checkOptions(const CommandLine &line, Options &options) {
 Result<Options> render::parseOptions(const std::vector<std::string> &words) {
   CommandLine line(
       "piko-render [options] FILE.piko.cpp SCENE\n"
-      "       piko-render [options] FILE.piko.cpp CAPTURE",
+      "piko-render [options] FILE.piko.cpp CAPTURE",
       "Compiles a pipeline that uses the types of piko/scene.h, renders a "
       "scene with it, and says how long a frame took. Or runs any pipeline on "
       "what an application has fed and bound, which pikort_capture or "
       "$PIKO_CAPTURE has written. In place of the text there may be what was "
       "compiled ahead of time: FILE.so, a shared library of pikoc's objects, "
-      "each of which runs on what it was made for.");
+      "each of which runs on what it was made for.",
+      "piko-render raster.piko.cpp --pipe Fused bunny.obj --out bunny.png");
   Options options;
   line.addText("--pipe", "NAME", options.load.pipeName,
                "which pipeline of the file (the only one)");
   addCompilerOptions(line, options);
   addRunOptions(line, options);
   addSceneOptions(line, options);
+  addBriefs(line);
   auto help = line.read(words);
   if (!help)
     return help.error();

@@ -36,6 +36,7 @@ struct Options {
   bool counters = false; ///< count the work of one more frame
   bool explain = false;
   bool json = false, kernelTimes = false;
+  bool quiet = false; ///< no summary
 };
 
 /// Those of what is rendered, and how it is seen and run, which piko-tune has,

@@ -190,11 +190,12 @@ Json render::makeReport(const Options &options, const RunResult &result,
   return report;
 }
 
-std::string render::summarize(const RunResult &result,
+std::string render::summarize(const Options &options, const RunResult &result,
                               pikort_pipeline *pipeline) {
   std::string where = nameDevice(pipeline);
   if (where.empty())
-    where = std::to_string(result.threads) + " threads";
+    where = std::to_string(result.threads) +
+            (result.threads == 1 ? " thread" : " threads");
   auto [count, kind] =
       result.primitives > 0 ? std::pair(result.primitives, "primitives")
       : result.patches > 0  ? std::pair(result.patches, "patches")
@@ -202,14 +203,20 @@ std::string render::summarize(const RunResult &result,
   // A capture need not have an image.
   std::string pixels = result.primitives > 0 && result.pixels == 0
                            ? ""
-                           : std::to_string(result.pixels) + " pixels, ";
+                           : std::to_string(result.pixels) + " pixels of " +
+                                 std::to_string(result.width) + " x " +
+                                 std::to_string(result.height) + ", ";
   char text[512];
   std::snprintf(text, sizeof text,
                 "%s: %.2f ms a frame (median of %d, %.2f to %.2f), "
-                "%lld %s, %s%s, compiled in %.0f ms",
+                "%lld %s, %starget %s, %s, compiled in %.0f ms",
                 pikort_name(pipeline), result.times.median, result.times.count,
                 result.times.min, result.times.max,
                 static_cast<long long>(count), kind, pixels.c_str(),
-                where.c_str(), result.compileMilliseconds);
-  return text;
+                nameTarget(options, pipeline), where.c_str(),
+                result.compileMilliseconds);
+  std::string lines = text;
+  for (const std::string &image : options.images)
+    lines += "\nwrote '" + image + "'";
+  return lines;
 }

@@ -43,8 +43,9 @@ Result<Json> timeKernels(const Options &options, pikort_pipeline *pipeline);
 Json makeReport(const Options &options, const RunResult &result,
                 pikort_pipeline *pipeline);
 
-/// The same in short, for people.
-std::string summarize(const RunResult &result, pikort_pipeline *pipeline);
+/// What was drawn, how fast and on what, and where it is, for people.
+std::string summarize(const Options &options, const RunResult &result,
+                      pikort_pipeline *pipeline);
 
 } // namespace piko::render
 

@@ -14,10 +14,10 @@
 #include "Trace.h"
 #include "Wastes.h"
 
+#include "Piko/CommandLine/Progress.h"
 #include "Piko/Driver/TunedSetting.h"
 #include "Piko/Replay/Outcome.h"
 #include "Piko/Scene/ImageFile.h"
-#include "Piko/Scene/ProgressBar.h"
 #include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 
@@ -49,7 +49,7 @@ private:
 /// Runs the warm-up frames, then the timed ones.
 Result<FrameTimes> timeFrames(const Options &options,
                               pikort_pipeline *pipeline) {
-  ProgressBar bar("rendering");
+  Progress bar("rendering");
   double limit = 1000 * options.seconds,
          total = options.warmup + options.frames;
   Stopwatch warmup;
@@ -165,8 +165,10 @@ Result<Done> report(const Options &options, const RunResult &result,
                     SceneInput &scene, const std::vector<Agreement> &agreements,
                     pikort_pipeline *pipeline) {
   Json line = makeReport(options, result, pipeline);
-  std::string text =
-      summarize(result, pipeline) + "\n" + printAgreements(agreements);
+  std::string text;
+  if (!options.quiet)
+    text = summarize(options, result, pipeline) + "\n";
+  text += printAgreements(agreements);
   if (!agreements.empty())
     line["against"] = reportAgreements(agreements);
   if (options.json && isTimed(options, pipeline)) {

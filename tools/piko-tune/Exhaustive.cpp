@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Exhaustive.h"
 
-#include "Piko/Scene/ProgressBar.h"
+#include "Piko/CommandLine/Progress.h"
 
 #include <algorithm>
 #include <climits>
@@ -26,7 +26,7 @@ static constexpr int surveyRounds = 6, surveyInstances = 4;
 static std::vector<Trial *> rankAll(Search &search, Bench &bench,
                                     const std::vector<Trial *> &all,
                                     Survey &survey) {
-  render::ProgressBar bar("running all settings");
+  Progress bar("running all settings");
   std::vector<std::pair<double, Trial *>> order;
   Trial *text = all[0];
   for (size_t begin = 1; begin < all.size(); begin += blockSize) {
@@ -83,7 +83,7 @@ Result<Survey> tune::surveyAll(const std::vector<Dimension> &dimensions,
   Search search(dimensions, bench, limit, INT_MAX);
   std::vector<Trial *> all;
   {
-    render::ProgressBar bar("compiling all settings");
+    Progress bar("compiling all settings");
     for (const Setting &setting : *settings) {
       if (Trial *trial = search.getTrial(setting, /*isNew=*/true);
           trial || all.empty())

@@ -52,6 +52,7 @@ void Search::leaveOut(Trial *trial, const std::string &why) {
 
 bool Search::visit(Trial *trial, double *time) {
   runs += runsOfVisit;
+  advance(double(runs) / double(budget));
   auto result = bench.visit(trial->setting);
   if (!result) {
     leaveOut(trial, result.error().message);

@@ -136,6 +136,8 @@ public:
 
   /// Is told what happens.
   std::function<void(const std::string &)> log;
+  /// Is told which part of the budget is spent.
+  std::function<void(double)> advance = [](double) {};
 
 private:
   bool visit(Trial *trial, double *time);

@@ -36,13 +36,8 @@ void setMetric(const std::string &name, TuneOptions &options) {
                                                         {"rms", Metric::RMS},
                                                         {"p99", Metric::P99},
                                                         {"flip", Metric::FLIP}};
-  auto found = metrics.find(name);
-  if (found == metrics.end())
-    throw CommandLine::wrong("--metric",
-                             "expected max, mean, rms, p99 or flip, but got '" +
-                                 name + "'");
   options.metricName = name;
-  options.metric = found->second;
+  options.metric = metrics.at(name);
 }
 
 void setSpace(const std::string &names, TuneOptions &options) {
@@ -57,13 +52,6 @@ void setSpace(const std::string &names, TuneOptions &options) {
                          group + "'");
     options.space.insert(group);
   }
-}
-
-void setClock(const std::string &clock, TuneOptions &options) {
-  options.countsCPU = clock == "cpu";
-  if (clock != "cpu" && clock != "wall")
-    throw CommandLine::wrong("--clock",
-                             "expected wall or cpu, but got '" + clock + "'");
 }
 
 void addOptions(CommandLine &line, TuneOptions &options) {
@@ -84,8 +72,15 @@ void addOptions(CommandLine &line, TuneOptions &options) {
   add("--error", "E", setError,
       "the largest error that is allowed, 0 or more, or A/B (1/255); 0 leaves "
       "out precisions");
-  add("--metric", "METRIC", setMetric,
-      "the error, as piko-diff measures it: max, mean, rms, p99 or flip (max)");
+  line.addChoice(
+      "--metric", "METRIC",
+      {{"max", "the largest difference"},
+       {"mean", "the mean one"},
+       {"rms", "the root of the mean square"},
+       {"p99", "the 99th percentile"},
+       {"flip", "what an observer notices"}},
+      [&](const std::string &name) { setMetric(name, options); },
+      "the error, as piko-diff measures it (max):");
   line.addText("--reference", "IMAGE", options.reference,
                "what images are compared with (what the text gives)");
   add("--space", "GROUP,...", setSpace,
@@ -93,10 +88,13 @@ void addOptions(CommandLine &line, TuneOptions &options) {
       "strips, and single passes of synthesis by name (all groups but strips)");
   line.addNumber("--budget", "RUNS", options.budget,
                  "frames to run at most (500)", 1, 1'000'000'000);
-  add("--clock", "CLOCK", setClock,
-      "what counts: wall, the time that a frame takes, or cpu, that of "
-      "processors, for machines that do something else, too, with --threads 1 "
-      "(wall)");
+  line.addChoice(
+      "--clock", "CLOCK",
+      {{"wall", "the time that a frame takes"},
+       {"cpu", "that of processors, for machines that do something else, too, "
+               "with --threads 1"}},
+      [&](const std::string &clock) { options.countsCPU = clock == "cpu"; },
+      "what counts (wall):");
   line.addText("--out", "FILE", options.out,
                "write the setting for pikoc --tuned and piko-render --tuned");
   line.addText("--chart", "FILE.svg", options.chart, "draw error against time");
@@ -117,11 +115,27 @@ tune::parseTuneOptions(const std::vector<std::string> &words) {
       "Looks for the setting of a pipeline that renders a scene fastest, of "
       "all whose error is small enough: values of its tunables, and schedules, "
       "lanes, precisions and passes that the text leaves open. Nothing is "
-      "changed in the text.");
+      "changed in the text.",
+      "piko-tune raster.piko.cpp --pipe Fused bunny.obj --out fast.json");
   TuneOptions options;
   addOptions(line, options);
   line.beginGroup("How the scene is seen and run, as for piko-render");
   render::addSceneOptions(line, options.render);
+  line.setBrief("--pipe",
+                "which pipelines may be chosen; the first is the text's");
+  line.setBrief("--error", "the largest error that is allowed (1/255)");
+  line.setBrief("--metric",
+                "how it is measured: max, mean, rms, p99, flip (max)");
+  line.setBrief("--space", "what may be changed: tunables, schedules, ...");
+  line.setBrief("--budget", "frames to run at most (500)");
+  line.setBrief("--out", "write the setting, for --tuned");
+  line.setBrief("--chart", "draw error against time");
+  line.setBrief("--json", "print one line of JSON");
+  line.setBrief("--threads", "threads, 0 for all (0)");
+  line.setBrief("--width", "pixels of a row (1024)");
+  line.setBrief("--height", "rows (768)");
+  line.setBrief("-I", "for the pipeline's preprocessor");
+  line.setBrief("-D", "likewise");
   auto help = line.read(words);
   if (!help)
     return help.error();

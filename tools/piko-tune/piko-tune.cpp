@@ -11,6 +11,8 @@
 #include "Report.h"
 #include "SceneBench.h"
 
+#include "Piko/CommandLine/Messages.h"
+#include "Piko/CommandLine/Progress.h"
 #include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 
@@ -39,7 +41,7 @@ Result<Done> writeFiles(const TuneResult &result) {
 Result<Space> loadSpace(const TuneOptions &options) {
   std::string diagnostics;
   auto space = readSpace(options, diagnostics);
-  std::fputs(diagnostics.c_str(), stderr);
+  std::fputs(addToolName("piko-tune", diagnostics).c_str(), stderr);
   if (!space)
     return Error{}; // already said
   return std::move(*space);
@@ -47,6 +49,18 @@ Result<Space> loadSpace(const TuneOptions &options) {
 
 /// Colours are floats: one step of 255 may be a little more than 1/255.
 double getLimit(const TuneOptions &options) { return options.error * 1.0001; }
+
+Result<Outcome> runSearch(Search &search, const TuneOptions &options) {
+  Progress progress("tuning for " + options.render.scene);
+  search.log = [&](const std::string &line) {
+    progress.say("piko-tune: " + line);
+  };
+  search.advance = [&](double part) { progress.update(part); };
+  auto outcome = search.run();
+  search.log = [](const std::string &) {};
+  search.advance = [](double) {};
+  return outcome;
+}
 
 /// Everything after the command line.
 Result<Done> tuneScene(const TuneOptions &options) {
@@ -57,10 +71,7 @@ Result<Done> tuneScene(const TuneOptions &options) {
   if (!bench)
     return bench.error();
   Search search(space->dimensions, **bench, getLimit(options), options.budget);
-  search.log = [](const std::string &line) {
-    std::fprintf(stderr, "piko-tune: %s\n", line.c_str());
-  };
-  auto outcome = search.run();
+  auto outcome = runSearch(search, options);
   if (!outcome)
     return outcome.error();
   TuneResult result{options, *space, search.getTrials(), *outcome};

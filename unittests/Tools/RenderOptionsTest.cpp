@@ -128,8 +128,9 @@ TEST(RenderOptions, Check) {
 }
 
 TEST(RenderOptions, Errors) {
-  EXPECT_EQ(errorOf({"a", "b", "--nope"}), "unknown option '--nope'");
-  EXPECT_EQ(errorOf({"a", "b", "-x"}), "unknown option '-x'");
+  EXPECT_EQ(errorOf({"a", "b", "--nope"}),
+            "unknown option '--nope'; see --help");
+  EXPECT_EQ(errorOf({"a", "b", "-x"}), "unknown option '-x'; see --help");
   EXPECT_EQ(errorOf({"a", "b", "c"}), "unexpected argument 'c'");
   EXPECT_EQ(errorOf({"a"}), "expected a pipeline file and a scene file");
   EXPECT_EQ(errorOf({"a", "b", "--width"}), "option '--width' lacks its value");

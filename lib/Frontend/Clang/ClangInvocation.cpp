@@ -20,10 +20,14 @@ piko::getClangArguments(llvm::ArrayRef<const char *> flags,
       "-ffp-contract=off",
       "-resource-dir",
       options.resourceDir.empty() ? PIKO_CLANG_RESOURCE_DIR
-                                  : options.resourceDir,
-      "-isystem",
-      options.runtimeIncludeDir.empty() ? PIKO_RUNTIME_INCLUDE_DIR
-                                        : options.runtimeIncludeDir};
+                                  : options.resourceDir};
+  std::string runtime = options.runtimeIncludeDir.empty()
+                            ? PIKO_RUNTIME_INCLUDE_DIR
+                            : options.runtimeIncludeDir;
+  // That one is searched anyway, and after the headers of C++, which include
+  // the next one of a name; as -isystem it would come before them.
+  if (runtime != "/usr/include")
+    arguments.insert(arguments.end(), {"-isystem", runtime});
   arguments.insert(arguments.end(), flags.begin(), flags.end());
   for (const std::string &directory : options.includeDirs)
     arguments.push_back("-I" + directory);

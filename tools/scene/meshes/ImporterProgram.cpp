@@ -14,6 +14,8 @@
 #include "MeshBuilder.h"
 #include "PackedFile.h"
 
+#include "Piko/CommandLine/CommandLine.h"
+
 #include <assimp/Importer.hpp>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -169,12 +171,24 @@ void limitTime() {
 } // namespace
 
 int main(int argc, char **argv) {
-  if (argc != 2) {
-    std::fputs("piko-import: expected a scene's file\n", stderr);
+  CommandLine line("piko-import FILE",
+                   "Reads a scene of a format that piko-render does not read "
+                   "itself, and writes it as PLY to the standard output. "
+                   "piko-render calls it.",
+                   "piko-import teapot.3ds > teapot.ply");
+  std::string file;
+  line.addText("FILE", "", file, "what assimp reads, gzipped or not");
+  auto help = line.read({argv + 1, argv + argc});
+  if (!help || (help->empty() && file.empty())) {
+    std::fprintf(stderr, "piko-import: error: %s\n",
+                 help ? "expected a scene's file"
+                      : help.error().message.c_str());
     return 2;
   }
+  if (!help->empty())
+    return std::fputs(help->c_str(), stdout) < 0;
   limitTime();
-  auto mesh = import(argv[1]);
+  auto mesh = import(file);
   if (mesh)
     writePly(*mesh);
   else

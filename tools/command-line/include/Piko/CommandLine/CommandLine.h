@@ -9,6 +9,7 @@
 #ifndef PIKO_COMMANDLINE_COMMANDLINE_H
 #define PIKO_COMMANDLINE_COMMANDLINE_H
 
+#include "Piko/CommandLine/Help.h"
 #include "Piko/Support/Result.h"
 
 #include <CLI/CLI.hpp>
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -32,11 +34,16 @@ public:
   static constexpr T lowest = std::numeric_limits<T>::lowest();
   template <class T> static constexpr T highest = std::numeric_limits<T>::max();
 
-  /// `usage` is what the first line of the help says, but for "usage: ".
-  CommandLine(const std::string &usage, const std::string &description);
+  /// `usage` is a line for each way to call the tool, whose name each begins
+  /// with; of the description the first sentence says what it is.
+  CommandLine(const std::string &usage, const std::string &description,
+              const std::string &example = "");
 
   /// The heading in the help of the options that are added from here on.
   void beginGroup(const std::string &name);
+
+  /// Puts an option into the help that fits a screen, in these few words.
+  void setBrief(const std::string &name, const std::string &brief);
 
   /// `value` as the help shows it. A positional's name has no dashes.
   CLI::Option *addText(const std::string &name, const std::string &value,
@@ -50,6 +57,11 @@ public:
   /// `action` gets with it.
   CLI::Option *addOptional(const std::string &name, const std::string &value,
                            Action action, const std::string &description);
+
+  /// An option that takes one of these words.
+  CLI::Option *addChoice(const std::string &name, const std::string &value,
+                         std::vector<Choice> choices, Action action,
+                         const std::string &description);
 
   template <class T>
   CLI::Option *addNumber(const std::string &name, const std::string &value,
@@ -93,11 +105,21 @@ public:
     return CLI::ValidationError(name, message);
   }
 
-  /// Reads all words. Returns the help if that is asked for, or else nothing.
+  /// Reads all words. Returns what is asked for in place of the tool's work,
+  /// the help or the version, or else nothing.
   support::Result<std::string> read(Words words);
+
+  ToolHelp describe() const;
 
   /// The first option of the group on the command line; empty if there is none.
   std::string findOption(const std::string &group) const;
+
+private:
+  support::Error refuse(const std::string &word) const;
+
+  ToolHelp tool; ///< without its options
+  std::map<std::string, std::string> briefs;
+  std::map<const CLI::Option *, std::vector<Choice>> choicesOf;
 };
 
 /// The parts of a text between commas; none may be empty.
