@@ -109,7 +109,7 @@ passes and tools for Piko's MLIR dialect are: headers, static libraries, and a p
 for CMake. The dialect also needs the packages that this one recommends."
   DEPENDS "${needed}" "piko-tools (= ${version})"
     libomp-${llvm}-dev
-  RECOMMENDS libmlir-${llvm}-dev llvm-${llvm}-dev)
+  RECOMMENDS libmlir-${llvm}-dev llvm-${llvm}-dev mlir-${llvm}-tools)
 piko_add_package(documentation piko-doc ALL SECTION doc
   SUMMARY "documentation and examples of Piko"
   TEXT "${about}

@@ -53,7 +53,7 @@ step 'every library is found' \
   'for file in /usr/bin/piko* /usr/lib/libpikort.so.* /usr/lib/piko/modules/*.so; do
      ! ldd "$file" | grep "not found"
    done'
-step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev \
+step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev mlir-22-tools \
   glmark2-data man-db bash-completion zsh lintian"
 
 step 'an application, as the tutorial makes it' \
