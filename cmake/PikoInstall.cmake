@@ -55,16 +55,14 @@ if(PIKO_ENABLE_COMPILER)
   if(Python3_Interpreter_FOUND)
     set(manuals ${PROJECT_BINARY_DIR}/manuals)
     set(make_manuals ${PROJECT_SOURCE_DIR}/utils/make-manuals.py)
-    set(documented ${PIKO_TOOLS})
-    list(REMOVE_ITEM documented piko-render-library) # it says what piko-render does
     set(files "")
-    foreach(tool ${documented})
+    foreach(tool ${PIKO_TOOLS})
       list(APPEND files $<TARGET_FILE:${tool}>)
     endforeach()
     add_custom_command(OUTPUT ${manuals}/done
       COMMAND Python3::Interpreter ${make_manuals} --out ${manuals} ${files}
       COMMAND ${CMAKE_COMMAND} -E touch ${manuals}/done
-      DEPENDS ${documented} ${make_manuals}
+      DEPENDS ${PIKO_TOOLS} ${make_manuals}
       COMMENT "Writing manual pages and completions" VERBATIM)
     add_custom_target(manuals ALL DEPENDS ${manuals}/done)
     install(DIRECTORY ${manuals}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT tools)

@@ -80,39 +80,41 @@ if(NOT changes MATCHES "^piko \\(${PROJECT_VERSION}-${release}\\) ")
     "expected cmake/packages/changelog to begin with version ${version}, but got: ${changes}")
 endif()
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/packages-data)
-file(ARCHIVE_CREATE OUTPUT ${PROJECT_BINARY_DIR}/packages-data/changelog.Debian.gz
-  PATHS ${PROJECT_SOURCE_DIR}/cmake/packages/changelog FORMAT raw COMPRESSION GZip COMPRESSION_LEVEL 9)
+find_program(PIKO_GZIP gzip)
+mark_as_advanced(PIKO_GZIP)
+if(NOT PIKO_GZIP)
+  return()
+endif()
+execute_process(COMMAND ${PIKO_GZIP} -9nc ${PROJECT_SOURCE_DIR}/cmake/packages/changelog
+  OUTPUT_FILE ${PROJECT_BINARY_DIR}/packages-data/changelog.Debian.gz)
 
 set(needed "libpikort${PIKO_ABI_VERSION} (= ${version})")
-set(about "Piko compiles graphics pipelines that are written in C++ as graphs of stages,
-each with its bins of the screen.")
+# Lines of at most 80 characters, as Debian wants them.
+set(about "Piko compiles graphics pipelines that are written in C++ as graphs of
+stages, each with its bins of the screen.
+.
+This package has")
 piko_add_package(runtime libpikort${PIKO_ABI_VERSION}
   SECTION libs SHARED "libpikort ${PIKO_ABI_VERSION}"
   SUMMARY "runtime of compiled Piko pipelines"
-  TEXT "${about}
-.
-This package has the shared library that compiled pipelines and their hosts use.")
+  TEXT "${about} the shared library of compiled pipelines and their
+hosts.")
 piko_add_package(tools piko-tools SECTION devel
   SUMMARY "compiler and tools for programmable graphics pipelines"
-  TEXT "${about}
-.
-This package has pikoc, which compiles pipelines, piko.h, which they include, and
-tools that render, tune and compare them."
-  DEPENDS "${needed}" libclang-common-${llvm}-dev libstdc++-dev libglm-dev
+  TEXT "${about} pikoc, which compiles pipelines, piko.h, which they
+include, and tools that render, tune and compare them."
+  DEPENDS "${needed}" libclang-common-${llvm}-dev "libstdc++-12-dev | libstdc++-dev"
+    libglm-dev
   RECOMMENDS "libpiko-dev (= ${version})")
 piko_add_package(development libpiko-dev SECTION libdevel
   SUMMARY "headers, CMake package and libraries of Piko"
-  TEXT "${about}
-.
-This package has what applications with compiled pipelines are built with, and what
-passes and tools for Piko's MLIR dialect are: headers, static libraries, and a package
-for CMake. The dialect also needs the packages that this one recommends."
-  DEPENDS "${needed}" "piko-tools (= ${version})"
-    libomp-${llvm}-dev
+  TEXT "${about} what applications with compiled pipelines are built
+with, and what passes and tools for Piko's MLIR dialect are: headers, static
+libraries, and a package for CMake. The dialect also needs the packages that
+this one recommends."
+  DEPENDS "${needed}" "piko-tools (= ${version})" libomp-${llvm}-dev
   RECOMMENDS libmlir-${llvm}-dev llvm-${llvm}-dev mlir-${llvm}-tools)
 piko_add_package(documentation piko-doc ALL SECTION doc
   SUMMARY "documentation and examples of Piko"
-  TEXT "${about}
-.
-This package has the documents and the example pipelines.")
+  TEXT "${about} the documents and the example pipelines.")
 include(CPack)

@@ -169,9 +169,13 @@ def main():
     parser.add_argument("tools", nargs="+", metavar="TOOL", type=pathlib.Path)
     arguments = parser.parse_args()
     for tool in arguments.tools:
-        table = read_table(tool.resolve())
-        name = table["name"]
-        manual = gzip.compress(write_manual(table).encode(), mtime=0)
+        table = read_table(tool.absolute())
+        name = tool.name
+        page = write_manual(table)
+        if name != table["name"]:  # which it says it is
+            page = f".so man1/{table['name']}.1\n"
+        table["name"] = name
+        manual = gzip.compress(page.encode(), mtime=0)
         for path, content in [(f"man1/{name}.1.gz", manual), (f"bash/{name}", write_bash(table).encode()),
                               (f"zsh/_{name}", write_zsh(table).encode())]:
             file = arguments.out / path

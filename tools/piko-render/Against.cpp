@@ -4,6 +4,7 @@
 
 #include "Frame.h"
 
+#include "Piko/CommandLine/Progress.h"
 #include "Piko/Replay/Measure.h"
 
 #include <algorithm>
@@ -28,7 +29,8 @@ static Options retarget(Options options, const std::string &target) {
 
 /// What one run leaves. It stops with an error as a target's run may: that is
 /// an outcome, too.
-static Result<replay::Outcome> runOnce(const Options &options) {
+static Result<replay::Outcome> runOnce(const Options &options,
+                                       const std::string &label) {
   auto frame = Frame::load(options);
   if (!frame)
     return frame.error();
@@ -38,10 +40,13 @@ static Result<replay::Outcome> runOnce(const Options &options) {
   if (auto ok = frame->bind(options, *scene); !ok)
     return ok.error();
   replay::Outcome outcome;
-  if (auto ok = frame->run(); !ok) {
-    outcome.error = ok.error().message;
-    return outcome;
+  {
+    Progress progress(label);
+    if (auto ok = frame->run(); !ok)
+      outcome.error = ok.error().message;
   }
+  if (!outcome.error.empty())
+    return outcome;
   try {
     return replay::readOutcome(frame->pipeline());
   } catch (const std::runtime_error &error) {
@@ -66,12 +71,13 @@ static Agreement compare(const std::string &target, const replay::Outcome &own,
 }
 
 Result<std::vector<Agreement>> render::runAgainst(const Options &options) {
-  auto own = runOnce(options);
+  auto own = runOnce(options, "running once");
   if (!own)
     return own.error();
   std::vector<Agreement> agreements;
   for (const std::string &target : options.against) {
-    auto other = runOnce(retarget(options, target));
+    auto other =
+        runOnce(retarget(options, target), "running once on " + target);
     if (other)
       agreements.push_back(compare(target, *own, *other, options.tolerance));
     else

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Work.h"
 
+#include "Piko/CommandLine/Progress.h"
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -138,6 +140,7 @@ static Result<Done> countFrame(Options options, SceneInput &scene,
     return frame.error();
   if (auto ok = frame->bind(options, scene); !ok)
     return ok.error();
+  Progress progress("counting the work of a frame");
   if (auto ok = frame->run(); !ok)
     return ok.error();
   return Collector(work, frame->pipeline()).collect();

@@ -121,8 +121,10 @@ Result<Done> rerun(const Options &options, pikort_pipeline *pipeline) {
   if (options.reruns == 0)
     return Done{};
   try {
+    Progress progress("running again");
     replay::Outcome first = replay::readOutcome(pipeline);
     for (int i = 1; i <= options.reruns; ++i) {
+      progress.update(double(i - 1) / options.reruns);
       if (pikort_run(pipeline) != PIKORT_OK)
         return errorOf(pipeline);
       auto differences =

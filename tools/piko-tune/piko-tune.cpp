@@ -18,6 +18,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 using namespace piko;
 using namespace piko::tune;
@@ -40,7 +41,9 @@ Result<Done> writeFiles(const TuneResult &result) {
 
 Result<Space> loadSpace(const TuneOptions &options) {
   std::string diagnostics;
+  std::optional<Progress> progress("reading " + options.render.pipeline);
   auto space = readSpace(options, diagnostics);
+  progress.reset();
   std::fputs(addToolName("piko-tune", diagnostics).c_str(), stderr);
   if (!space)
     return Error{}; // already said
