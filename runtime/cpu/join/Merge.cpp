@@ -120,7 +120,7 @@ private:
 
   /// True if record i of stream a comes before record j of stream b.
   bool before(size_t a, int64_t i, size_t b, int64_t j) const {
-    return join::comesBefore(from_[a].keys, i, from_[b].keys, j, a < b);
+    return piko::join::comesBefore(from_[a].keys, i, from_[b].keys, j, a < b);
   }
 
   void forChunks(auto &&body) {

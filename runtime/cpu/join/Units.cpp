@@ -37,8 +37,8 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
   if (schedule.tileSplit > 0 && !stage.sharesTile)
     return schedule.tileSplit;
   if (p.accelerator)
-    return join::blockUnitSize(0, positions,
-                               p.accelerator->residentThreads() / 64);
+    return piko::join::blockUnitSize(0, positions,
+                                     p.accelerator->residentThreads() / 64);
   int64_t share = positions / (int64_t(p.threads) * 8);
   // One of a few primitives may have most of the domain's pixels.
   int64_t most = stage.selections.empty() ? 1024 : 64;
@@ -176,7 +176,7 @@ private:
   void makeCalls() {
     int64_t calls = 0;
     forBins([&](int64_t, int64_t count, int64_t batch) {
-      calls += join::callCount(count, batch, /*runsEmpty=*/true);
+      calls += piko::join::callCount(count, batch, /*runsEmpty=*/true);
     });
     kernel_.calls = Array<pikoir_call>(p_.memory, calls);
     calls = 0;
@@ -196,7 +196,7 @@ private:
       const BinSchedule &schedule = stage_.scheduleOf(bin);
       int64_t count = offsets_[bin + 1] - offsets_[bin];
       if (count > 0 || (schedule.everyBin && kernel_.firstRound))
-        body(bin, count, join::callSize(schedule.batch, count));
+        body(bin, count, piko::join::callSize(schedule.batch, count));
     }
   }
 
