@@ -8,6 +8,7 @@
 #                  libraries of the compiler
 #   tools          pikoc, piko-render, ..., and piko.h, which they read
 #   documentation  documents and the examples
+#   python         a module for Python, where a target PikoPython is one
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Piko)
 set(build_package_dir ${PROJECT_BINARY_DIR}/lib/cmake/Piko)
@@ -42,6 +43,9 @@ if(PIKO_ENABLE_COMPILER)
   endif()
   if(PIKO_ENABLE_ASSIMP)
     list(APPEND PIKO_TOOLS piko-import)
+  endif()
+  if(TARGET PikoPython)
+    list(APPEND PIKO_COMPONENTS python)
   endif()
   set_target_properties(${PIKO_TOOLS} PROPERTIES INSTALL_RPATH
     "$ORIGIN/../${CMAKE_INSTALL_LIBDIR};$ORIGIN/../${module_dir};${PIKO_LLVM_PREFIX}/lib")

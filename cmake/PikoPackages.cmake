@@ -114,6 +114,10 @@ libraries, and a package for CMake. The dialect also needs the packages that
 this one recommends."
   DEPENDS "${needed}" "piko-tools (= ${version})" libomp-${llvm}-dev
   RECOMMENDS libmlir-${llvm}-dev llvm-${llvm}-dev mlir-${llvm}-tools)
+piko_add_package(python python3-piko SECTION python
+  SUMMARY "pipelines compiled and run from Python"
+  TEXT "${about} the module piko for Python."
+  DEPENDS "piko-tools (= ${version})" python3 python3-numpy)
 piko_add_package(documentation piko-doc ALL SECTION doc
   SUMMARY "documentation and examples of Piko"
   TEXT "${about} the documents and the example pipelines.")
