@@ -25,6 +25,9 @@
 #include "llvm/Support/Path.h"
 #include "llvm/Support/SourceMgr.h"
 
+#include <dlfcn.h>
+#include <sys/auxv.h>
+
 using namespace mlir;
 using namespace piko;
 
@@ -48,15 +51,37 @@ static OwningOpRef<ModuleOp> parseMLIR(StringRef file, MLIRContext &context,
   return parseSourceFile<ModuleOp>(sources, &context);
 }
 
-std::string piko::getRuntimeIncludeDir() {
-  llvm::SmallString<128> path(llvm::sys::fs::getMainExecutable(
-      nullptr, reinterpret_cast<void *>(&getRuntimeIncludeDir)));
+/// The folder of the program, or of the shared library that this is in.
+static llvm::SmallString<128> getOwnFolder() {
+  llvm::SmallString<128> path;
+  Dl_info own, main;
+  auto *here = reinterpret_cast<void *>(&getOwnFolder);
+  auto *headers = reinterpret_cast<void *>(getauxval(AT_PHDR)); // the program's
+  if (dladdr(here, &own) && dladdr(headers, &main) &&
+      own.dli_fbase != main.dli_fbase)
+    (void)llvm::sys::fs::real_path(own.dli_fname, path);
+  else
+    path = llvm::sys::fs::getMainExecutable(nullptr, here);
   llvm::sys::path::remove_filename(path);
-  llvm::sys::path::append(path, "..", "include");
-  llvm::sys::path::remove_dots(path, /*remove_dot_dot=*/true);
-  if (llvm::sys::fs::exists(path + "/piko.h"))
-    return std::string(path);
+  return path;
+}
+
+static std::string findRuntimeIncludeDir() {
+  // A library may be in a folder of a kind of machine.
+  for (const char *up : {"..", "../.."}) {
+    llvm::SmallString<128> path = getOwnFolder();
+    llvm::sys::path::append(path, up, "include");
+    llvm::sys::path::remove_dots(path, /*remove_dot_dot=*/true);
+    if (llvm::sys::fs::exists(path + "/piko.h"))
+      return std::string(path);
+  }
   return PIKO_RUNTIME_INCLUDE_DIR;
+}
+
+std::string piko::getRuntimeIncludeDir() {
+  // A library's name may be relative to the folder that it was loaded in.
+  static const std::string found = findRuntimeIncludeDir();
+  return found;
 }
 
 FrontendOptions piko::getFrontendOptions(const CompileOptions &options) {
@@ -202,23 +227,29 @@ piko::readPipeline(const CompileOptions &options, MLIRContext &context,
 }
 
 FailureOr<std::vector<std::string>>
-piko::readPipelineNames(const CompileOptions &options, MLIRContext &context) {
+piko::readPipelineNames(const CompileOptions &options, MLIRContext &context,
+                        llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files) {
   context.loadAllAvailableDialects();
-  if (!isMLIR(options.file))
-    return listPipes(options.file, getFrontendOptions(options), context);
-  OwningOpRef<ModuleOp> module =
-      parseMLIR(options.file, context, *llvm::vfs::getRealFileSystem());
+  if (!isMLIR(options.file)) {
+    FrontendOptions frontend = getFrontendOptions(options);
+    frontend.files = files;
+    return listPipes(options.file, frontend, context);
+  }
+  OwningOpRef<ModuleOp> module = parseMLIR(options.file, context, *files);
   if (!module)
     return failure();
   return getNames(*module);
 }
 
 FailureOr<std::vector<TunableDescription>>
-piko::readTunables(const CompileOptions &options, MLIRContext &context) {
+piko::readTunables(const CompileOptions &options, MLIRContext &context,
+                   llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files) {
   context.loadAllAvailableDialects();
-  if (!isMLIR(options.file))
-    return listTunables(options.file, getFrontendOptions(options), context);
-  return std::vector<TunableDescription>();
+  if (isMLIR(options.file))
+    return std::vector<TunableDescription>();
+  FrontendOptions frontend = getFrontendOptions(options);
+  frontend.files = files;
+  return listTunables(options.file, frontend, context);
 }
 
 /// Findings and counts of work are about the stages as they are written.

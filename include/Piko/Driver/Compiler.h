@@ -38,8 +38,8 @@ Level getLevel(mlir::ModuleOp module);
 /// What `--emit` calls it.
 llvm::StringRef getName(Level level);
 
-/// Where piko.h is: beside the tool that is running, as it is installed, or in
-/// the source tree.
+/// Where piko.h is: beside the tool that is running, or the library that this
+/// is in, as it is installed, or in the source tree.
 std::string getRuntimeIncludeDir();
 
 /// Precompiled headers in the cache.
@@ -64,11 +64,15 @@ std::string getPipelineName(mlir::ModuleOp module,
 /// The names of the pipelines in a file, in the order in which they stand
 /// there.
 llvm::FailureOr<std::vector<std::string>>
-readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context);
+readPipelineNames(const CompileOptions &options, mlir::MLIRContext &context,
+                  llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files =
+                      llvm::vfs::getRealFileSystem());
 
 /// The tunables of a file; `.mlir` has none.
 llvm::FailureOr<std::vector<TunableDescription>>
-readTunables(const CompileOptions &options, mlir::MLIRContext &context);
+readTunables(const CompileOptions &options, mlir::MLIRContext &context,
+             llvm::IntrusiveRefCntPtr<llvm::vfs::FileSystem> files =
+                 llvm::vfs::getRealFileSystem());
 
 /// Adds the passes that take a module from one level to another one.
 void addPasses(mlir::OpPassManager &passes, Level from, Level to,

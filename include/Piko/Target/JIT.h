@@ -14,7 +14,7 @@
 namespace piko {
 
 /// Code in memory. The runtime's functions, OpenMP's and those of the C and C++
-/// libraries are the process's own.
+/// libraries are the process's own, and this compiler's.
 class JITCode {
 public:
   /// What Piko is built with: pipelines that run with its runtime should be

@@ -11,6 +11,10 @@
 #include "llvm/Support/Process.h"
 #include "llvm/Support/TargetSelect.h"
 
+#include "pikort/pikort.h"
+
+#include <dlfcn.h>
+
 using namespace llvm;
 using namespace piko;
 
@@ -39,6 +43,40 @@ createProcess(ArrayRef<StringRef> objects) {
                                                  std::move(*memory));
 }
 
+/// The runtime that this compiler is linked with, and all that it is linked
+/// with. A host may have loaded them for itself alone, as Python loads modules:
+/// then the process does not show them. It stays loaded.
+static sys::DynamicLibrary findRuntime() {
+  Dl_info runtime;
+  void *handle = nullptr;
+  if (dladdr(reinterpret_cast<void *>(&pikort_create), &runtime))
+    handle = dlopen(runtime.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
+  return handle ? sys::DynamicLibrary(handle) : sys::DynamicLibrary();
+}
+
+/// Finds what code calls: the runtime's functions in this compiler's runtime,
+/// all others where the process would, or else where the runtime does.
+static Error addSymbols(orc::JITDylib &library, char prefix) {
+  static const sys::DynamicLibrary runtime = findRuntime();
+  auto search = [&](auto &&...which) {
+    library.addGenerator(std::make_unique<orc::DynamicLibrarySearchGenerator>(
+        runtime, prefix, which...));
+  };
+  if (runtime.isValid())
+    search([](const orc::SymbolStringPtr &name) {
+      StringRef text = *name;
+      return text.contains("pikoir_") || text.contains("pikort_");
+    });
+  auto process =
+      orc::DynamicLibrarySearchGenerator::GetForCurrentProcess(prefix);
+  if (!process)
+    return process.takeError();
+  library.addGenerator(std::move(*process));
+  if (runtime.isValid())
+    search();
+  return Error::success();
+}
+
 Expected<std::unique_ptr<JITCode>> JITCode::load(ArrayRef<StringRef> objects) {
   InitializeNativeTarget();
   InitializeNativeTargetAsmPrinter();
@@ -50,12 +88,10 @@ Expected<std::unique_ptr<JITCode>> JITCode::load(ArrayRef<StringRef> objects) {
                  .create();
   if (!jit)
     return jit.takeError();
-  auto symbols = orc::DynamicLibrarySearchGenerator::GetForCurrentProcess(
-      (*jit)->getDataLayout().getGlobalPrefix());
-  if (!symbols)
-    return symbols.takeError();
   orc::JITDylib &library = (*jit)->getMainJITDylib();
-  library.addGenerator(std::move(*symbols));
+  if (Error error =
+          addSymbols(library, (*jit)->getDataLayout().getGlobalPrefix()))
+    return error;
   for (StringRef object : objects) {
     if (object.empty())
       continue;
