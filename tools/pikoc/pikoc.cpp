@@ -10,24 +10,18 @@
 #include "Piko/CommandLine/Messages.h"
 #include "Piko/CommandLine/Progress.h"
 #include "Piko/Driver/DeepStack.h"
-#include "Piko/Driver/Diagnostics.h"
-#include "Piko/Driver/Explain.h"
+#include "Piko/Driver/Inspect.h"
 #include "Piko/Driver/ObjectCompiler.h"
 #include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
-#include "Piko/Target/PTX.h"
-#include "Piko/Target/Processor.h"
 
 #include "llvm/ADT/StringExtras.h"
-#include "llvm/IR/LLVMContext.h"
-#include "llvm/IR/Module.h"
 #include "llvm/Support/CommandLine.h"
 #include "llvm/Support/InitLLVM.h"
 
 #include <csignal>
 #include <cstdio>
 
-using namespace mlir;
 using namespace piko;
 using pikoc::Emit;
 
@@ -43,158 +37,64 @@ static std::string printPipes(const std::vector<std::string> &names) {
   return text;
 }
 
-static std::string printTunables(const std::vector<TunableDescription> &list) {
+static std::string printTunables(const std::vector<Tunable> &list) {
   std::string text;
   llvm::raw_string_ostream stream(text);
-  for (const TunableDescription &tunable : list) {
-    if (auto place = dyn_cast<FileLineColLoc>(tunable.location))
-      stream << place.getFilename().getValue() << ":" << place.getLine() << ":"
-             << place.getColumn() << ": ";
+  for (const Tunable &tunable : list) {
+    if (tunable.line > 0)
+      stream << tunable.file << ":" << tunable.line << ":" << tunable.column
+             << ": ";
     stream << tunable.name << " = " << llvm::join(tunable.values, " | ")
            << "\n";
   }
   return text;
 }
 
-static std::string print(ModuleOp module) {
-  std::string text;
-  llvm::raw_string_ostream stream(text);
-  module->print(stream);
-  stream << "\n";
-  return text;
+/// What there is a text of, and no object.
+static TextKind getTextKind(const pikoc::Options &options) {
+  if (options.explain)
+    return TextKind::Report;
+  static constexpr TextKind kinds[] = {TextKind::Authored, TextKind::Kernels,
+                                       TextKind::Machine,  TextKind::Target,
+                                       TextKind::LLVM,     TextKind::LLVMIR,
+                                       TextKind::Assembly, TextKind::LLVMIR,
+                                       TextKind::GPU,      TextKind::PTX};
+  return kinds[static_cast<int>(options.getEmit())];
 }
 
-namespace {
-
-/// The text that is asked for of one pipeline, or of the file. Members return
-/// nothing after an error.
-class TextWriter {
-public:
-  TextWriter(const pikoc::Options &options, const std::string &pipe)
-      : options(options), source(options.getSource(pipe)),
-        target(options.getTarget(pipe)) {}
-
-  /// What a level looks like, the file's pipelines, or a report.
-  std::optional<std::string> write();
-
-private:
-  std::optional<std::string> writeAsked();
-  std::optional<std::string> explain();
-  /// LLVM IR as text, or assembly made of it.
-  std::optional<std::string> translate(ModuleOp module);
-  /// Kernels for a GPU, as a level or as PTX.
-  std::optional<std::string> writeKernels();
-
-  /// What levels below the machine's depend on.
-  std::optional<CPUOptions> findProcessor();
-  std::nullopt_t fail(llvm::Error error) {
-    diagnostics += "error: " + llvm::toString(std::move(error)) + "\n";
-    return std::nullopt;
+/// What a level looks like, the file's pipelines, or a report; nothing after an
+/// error.
+static std::optional<std::string> inspect(const pikoc::Options &options,
+                                          const std::string &pipe,
+                                          std::string &diagnostics) {
+  if (options.listPipes) {
+    auto names = listPipelines(options.getSource(pipe), diagnostics);
+    return names ? std::optional(printPipes(*names)) : std::nullopt;
   }
-
-  const pikoc::Options &options;
-  CompileOptions source;
-  const TargetOptions target;
-  PikoContext context;
-  std::string diagnostics; ///< Printed at the end.
-};
-
-} // namespace
-
-std::optional<CPUOptions> TextWriter::findProcessor() {
-  llvm::Expected<Processor> processor = resolveProcessor(options.cpu);
-  if (!processor)
-    return fail(processor.takeError());
-  return CPUOptions{.lanes = processor->lanes};
-}
-
-std::optional<std::string> TextWriter::explain() {
-  OwningOpRef<ModuleOp> module = readPipeline(source, context);
-  if (!module)
-    return std::nullopt;
-  std::optional<CPUOptions> cpu = findProcessor();
-  if (!cpu)
-    return std::nullopt;
-  auto report = explainPipeline(*module, source.check, source.synthesis, *cpu,
-                                source.gpu, options.optLevel);
-  return failed(report) ? std::nullopt : std::optional(*report);
-}
-
-std::optional<std::string> TextWriter::translate(ModuleOp module) {
-  llvm::LLVMContext llvmContext;
-  std::unique_ptr<llvm::Module> translated =
-      translateToLLVMIR(module, llvmContext, source.gpu, options.optLevel);
-  if (!translated)
-    return std::nullopt;
-  std::string text;
-  llvm::raw_string_ostream stream(text);
-  if (options.getEmit() == Emit::LLVMIR) {
-    translated->print(stream, nullptr);
-    return text;
+  if (options.listTunables) {
+    auto tunables =
+        listTunables(options.getSource(pipe, /*isTuned=*/false), diagnostics);
+    return tunables ? std::optional(printTunables(*tunables)) : std::nullopt;
   }
-  auto code = generateCode(*translated, target, CodeFormat::Assembly);
-  if (!code)
-    return fail(code.takeError());
-  return *code;
+  return writeText({.source = options.getSource(pipe),
+                    .kind = getTextKind(options),
+                    .target = options.getTarget(pipe),
+                    .remarks = options.remarks},
+                   diagnostics);
 }
 
-std::optional<std::string> TextWriter::writeKernels() {
-  OwningOpRef<ModuleOp> module = readPipeline(source, context);
-  if (!module ||
-      failed(lowerToGPU(*module, source.check, source.synthesis, source.gpu)))
-    return std::nullopt;
-  if (options.getEmit() == Emit::GPU)
-    return print(*module);
-  llvm::LLVMContext llvmContext;
-  std::unique_ptr<llvm::Module> kernels =
-      translateKernels(*module, llvmContext);
-  if (!kernels)
-    return std::nullopt;
-  auto text = generatePTX(*kernels, options.cpu, options.optLevel);
-  if (!text)
-    return fail(text.takeError());
-  return *text;
-}
-
-std::optional<std::string> TextWriter::write() {
+/// The text that is asked for of one pipeline, or of the file; nothing after an
+/// error.
+static std::optional<std::string> writeAsked(const pikoc::Options &options,
+                                             const std::string &pipe) {
+  std::string diagnostics;
   std::optional<std::string> text;
   {
     Progress progress("compiling " + options.file);
-    text = writeAsked();
+    text = inspect(options, pipe, diagnostics);
   }
   llvm::errs() << addToolName("pikoc", diagnostics);
   return text;
-}
-
-std::optional<std::string> TextWriter::writeAsked() {
-  llvm::raw_string_ostream stream(diagnostics);
-  DiagnosticPrinter printer(context, stream, options.remarks);
-  if (options.listPipes) {
-    auto names = readPipelineNames(source, context);
-    return failed(names) ? std::nullopt : std::optional(printPipes(*names));
-  }
-  if (options.listTunables) {
-    auto tunables = readTunables(
-        options.getSource(source.pipeName, /*isTuned=*/false), context);
-    return failed(tunables) ? std::nullopt
-                            : std::optional(printTunables(*tunables));
-  }
-  if (options.explain)
-    return explain();
-  Emit emit = options.getEmit();
-  if (emit >= Emit::GPU)
-    return writeKernels();
-  Level level = emit >= Emit::LLVMIR ? Level::LLVM : static_cast<Level>(emit);
-  std::optional<CPUOptions> cpu = findProcessor();
-  if (!cpu)
-    return std::nullopt;
-  // Who looks at it wants to see what the text means.
-  source.reusesAuthored = level != Level::Authored;
-  OwningOpRef<ModuleOp> module = readPipeline(source, context);
-  if (!module || failed(lowerPipeline(*module, level, source.check,
-                                      source.synthesis, source.gpu, *cpu)))
-    return std::nullopt;
-  return emit >= Emit::LLVMIR ? translate(*module) : print(*module);
 }
 
 /// The texts of all pipelines that are named; nothing after an error.
@@ -204,7 +104,7 @@ static std::optional<std::string> writeTexts(const pikoc::Options &options) {
                 emit != Emit::Assembly && emit != Emit::PTX;
   std::string texts;
   for (const std::string &pipe : options.pipes) {
-    std::optional<std::string> text = TextWriter(options, pipe).write();
+    std::optional<std::string> text = writeAsked(options, pipe);
     if (!text)
       return std::nullopt;
     if (!texts.empty())
