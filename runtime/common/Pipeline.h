@@ -333,7 +333,8 @@ struct pikort_pipeline {
   std::string deviceRefusal; ///< Why it is on the processor, if that is news.
   std::string message;
   std::atomic<int32_t> status{0};
-  std::atomic<int32_t> reported{0}; ///< Some error that report() noted.
+  std::atomic<int32_t> reported{0};     ///< Some error that report() noted.
+  std::atomic<bool> interrupted{false}; ///< No kernel shall begin.
 
   // Of a run that the host has not waited for:
   bool pending = false;

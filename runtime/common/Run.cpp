@@ -268,6 +268,11 @@ int32_t pikort_run_async(pikort_pipeline *p, void *stream) {
   return run(p, stream, /*waits=*/false);
 }
 
+void pikort_interrupt(pikort_pipeline *p, int32_t on) {
+  if (p)
+    p->interrupted = on != 0;
+}
+
 int32_t pikort_capture(pikort_pipeline *p, const char *path) {
   return call(p, [&] {
     if (!path)

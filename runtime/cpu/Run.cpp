@@ -160,10 +160,19 @@ static auto nameOf(const pikort_pipeline &p, const Kernel &kernel) {
       [&p, &kernel] { return "stage " + quoted(p.stages[kernel.stage].name); };
 }
 
+[[gnu::cold, gnu::noinline]] static void failInterrupted(pikort_pipeline &p,
+                                                         Kernel &kernel) {
+  throw Failure{PIKORT_INTERRUPTED, "pipeline " + quoted(p.name) +
+                                        ": interrupted before stage " +
+                                        quoted(p.stages[kernel.stage].name)};
+}
+
 static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
   if (p.status != PIKORT_OK)
     return nullptr;
   int32_t code = guarded(&p, nameOf(p, kernel), [&] {
+    if (p.interrupted.load(std::memory_order_relaxed)) [[unlikely]]
+      failInterrupted(p, kernel);
     chooseLaunch(p, kernel);
     // What a serial launch takes is its cycle's time.
     if (!kernel.runsSerially)

@@ -30,7 +30,8 @@ enum class Act {
   BadClear,
   Fail,
   Status,
-  SkipSource
+  SkipSource,
+  Interrupt
 };
 Act act = Act::Nothing;
 
@@ -77,6 +78,8 @@ int32_t run(pikort_pipeline *p) {
       }
       pikoir_close(w);
     }
+    if (act == Act::Interrupt)
+      pikort_interrupt(p, 1);
     if (int32_t status = pikoir_end_source(p, 0))
       return status;
   }
@@ -373,6 +376,19 @@ TEST_F(Host, ErrorsOfGeneratedCode) {
   expectError(pipe.run(), PIKORT_BAD_PROGRAM,
               "stage 'bin': expected the bins of source 0 to be assigned "
               "before");
+}
+
+TEST_F(Host, Interrupted) {
+  bindAll();
+  pikort_interrupt(nullptr, 1);
+  act = Act::Interrupt; // after the first kernel
+  expectError(pipe.run(), PIKORT_INTERRUPTED,
+              "pipeline 'Small': interrupted before stage 'bin'");
+  act = Act::Nothing;
+  EXPECT_EQ(pipe.run().code(), PIKORT_INTERRUPTED);
+  pikort_interrupt(pipe.get(), 0);
+  EXPECT_TRUE(pipe.run());
+  EXPECT_EQ(pipe.view<Pixel>("depth")(0).z, 3.0f);
 }
 
 TEST_F(Host, Reflection) {

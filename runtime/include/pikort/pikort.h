@@ -68,6 +68,7 @@ enum pikort_status {
   PIKORT_REPEATED = 12,        ///< A run was, after what followed it in its
                                ///< stream: see pikort_run_async.
   PIKORT_NOT_WRITTEN = 13,     ///< A file could not be written.
+  PIKORT_INTERRUPTED = 14,     ///< pikort_interrupt has ended the run.
   PIKORT_BIN_OUTSIDE = 16,     ///< AssignBin named a bin outside the grid.
   PIKORT_UPDATE_OUTSIDE = 17,  ///< An update outside of the call's own bin.
   PIKORT_INDEX_OUTSIDE = 18,   ///< An element outside a buffer or an image.
@@ -289,6 +290,13 @@ PIKORT_API int32_t pikort_run_async(pikort_pipeline *pipeline, void *stream);
 PIKORT_API int32_t pikort_wait(pikort_pipeline *pipeline);
 /// 1 if pikort_wait would not wait, or has an error of the device to report.
 PIKORT_API int32_t pikort_is_done(const pikort_pipeline *pipeline);
+
+/// From any thread, or in a signal's handler: no kernel begins any more, so
+/// that runs end with PIKORT_INTERRUPTED, the one that goes on and later ones,
+/// until the host says 0. Their results are incomplete. A kernel that has begun
+/// is not stopped; nor is a run that a device has all of, nor one of the
+/// reference executor.
+PIKORT_API void pikort_interrupt(pikort_pipeline *pipeline, int32_t on);
 
 /// Writes what a run would take now to a file: the domain, the options that
 /// decide how it is divided, constants, buffers, and the sources' primitives.
