@@ -43,21 +43,22 @@ deps:
 configure: deps
 	@cmake --preset $(PRESET) -D BUILD_TESTING=ON -D PIKO_ENABLE_GPU=ON \
 	  -D PIKO_ENABLE_OPENIMAGEIO=ON -D PIKO_ENABLE_ASSIMP=ON \
-	  -D PIKO_UNITE=$(UNITE)
+	  -D PIKO_ENABLE_PYTHON=ON -D PIKO_UNITE=$(UNITE)
 
 build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
 
 # Builds no more than it needs: where nothing is configured yet, no tests, no code
-# generation for GPUs, no OpenImageIO and no assimp, which `make build` adds to the same
-# folder.
+# generation for GPUs, no OpenImageIO, no assimp and no Python module, which `make build`
+# adds to the same folder.
 demo:
 	@echo "1 of 4: packages"
 	@utils/install-deps.sh utils/packages-demo.txt
 	@echo "2 of 4: configuring"
 	@[ -e $(BUILD)/build.ninja ] || cmake --preset $(PRESET) \
 	  -D BUILD_TESTING=OFF -D PIKO_ENABLE_GPU=OFF \
-	  -D PIKO_ENABLE_OPENIMAGEIO=OFF -D PIKO_ENABLE_ASSIMP=OFF -D PIKO_UNITE=ON
+	  -D PIKO_ENABLE_OPENIMAGEIO=OFF -D PIKO_ENABLE_ASSIMP=OFF \
+	  -D PIKO_ENABLE_PYTHON=OFF -D PIKO_UNITE=ON
 	@echo "3 of 4: building piko-render"
 	@cmake --build $(BUILD) --parallel $(JOBS) --target piko-render
 	@echo "4 of 4: rendering the bunny"

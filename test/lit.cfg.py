@@ -9,6 +9,7 @@ split-file. Substitutions:
   %benchmarks    folder of the benchmarks
   %bunny         a mesh of 69,666 triangles that a Debian package installs
   %python        the Python interpreter
+  %module_python the Python that the Python module is for
   %cache         the cache that tests share, for one that has its own
   %utils, %docs  folders of the developer scripts and of the documents
   %readme        the README
@@ -160,6 +161,7 @@ config.substitutions += [
     ("%bunny", bunny),
     # A version manager would look for the right one each time.
     ("%python", sys.executable),
+    ("%module_python", config.module_python),
     ("%cache", config.environment["PIKO_CACHE_DIR"]),
     ("%qt_include", "".join(glob.glob("/usr/include/*/qt5")[:1])),
     ("%utils", os.path.join(config.piko_source_root, "utils")),

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Does a pipeline give what the reference executor gives?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Iterator, List, Optional, Tuple
+
+import numpy as np
+
+from ._errors import RunError
+from ._pipeline import Array, Pipeline
+from ._records import DType
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A field of a piece of state that differs: in `count` records, first in the one at
+    `index`, where `expected` and `actual` are its numbers, and at most by `largest`."""
+
+    state: str
+    field: str
+    index: Tuple[int, ...]
+    expected: Any
+    actual: Any
+    count: int
+    largest: float
+
+    def __str__(self) -> str:
+        where = f"{self.state}[{', '.join(map(str, self.index))}]"
+        name = f"{where}.{self.field}" if self.field else where
+        return (
+            f"{name}: expected {self.expected}, but got {self.actual}; {self.count}"
+            f" differ, by at most {self.largest:.6g}"
+        )
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What two runs have left; true where that is the same."""
+
+    target: str
+    against: str
+    differences: Tuple[Difference, ...]
+    # How runs ended that did not end well.
+    expected_error: Optional[str] = None
+    actual_error: Optional[str] = None
+
+    def __bool__(self) -> bool:
+        return not self.differences and self.expected_error == self.actual_error
+
+    def __str__(self) -> str:
+        if self:
+            return f"{self.target} against {self.against}: equal"
+        lines = [f"{self.target} against {self.against}: different"]
+        if self.expected_error != self.actual_error:
+            lines.append(
+                f"  expected {self.expected_error or 'no error'}, but got"
+                f" {self.actual_error or 'none'}"
+            )
+        lines += [f"  {one}" for one in self.differences]
+        return "\n".join(lines)
+
+
+def _leaves(dtype: DType, path: str = "") -> Iterator[Tuple[Tuple[str, ...], str]]:
+    """The fields that are numbers or arrays of them, as keys and as text."""
+
+    def walk(part: DType, keys: Tuple[str, ...]) -> Iterator[Tuple[str, ...]]:
+        base = part.subdtype[0] if part.subdtype else part
+        if not base.fields:
+            yield keys
+            return
+        for name, entry in base.fields.items():
+            yield from walk(entry[0], (*keys, name))
+
+    for keys in walk(dtype, ()):
+        yield keys, ".".join(keys)
+
+
+def _compare_numbers(
+    state: str, field: str, expected: Array, actual: Array, rank: int, tolerance: float
+) -> Optional[Difference]:
+    if expected.shape != actual.shape:
+        return Difference(
+            state, field, (), f"shape {expected.shape}", f"shape {actual.shape}", 1, 0.0
+        )
+    both_nan = np.zeros(expected.shape, bool)
+    if expected.dtype.kind == "f":
+        both_nan = np.isnan(expected) & np.isnan(actual)
+    bits = f"u{expected.dtype.itemsize}"
+    differs = (expected.view(bits) != actual.view(bits)) & ~both_nan
+    if not differs.any():
+        return None
+    with np.errstate(invalid="ignore", over="ignore"):
+        gaps = np.abs(expected.astype("f8") - actual.astype("f8"))
+    gaps = np.where(np.isnan(gaps), np.inf, gaps)
+    if tolerance > 0:
+        differs &= gaps > tolerance
+        if not differs.any():
+            return None
+    records = differs.reshape(*differs.shape[:rank], -1).any(axis=-1)
+    index = tuple(int(i) for i in np.argwhere(records)[0])
+    return Difference(
+        state,
+        field,
+        index,
+        expected[index].tolist(),
+        actual[index].tolist(),
+        int(records.sum()),
+        float(gaps[differs].max()),
+    )
+
+
+def _run_copy(pipe: Pipeline, other: Pipeline) -> Optional[str]:
+    """Runs another pipeline on copies of what one has; how that failed."""
+    other.domain = pipe.domain
+    for name, state in pipe._states.items():
+        if state.kind == "constant":
+            other._set_constant(other._find(name), pipe[name])
+        elif state.kind == "buffer" and state.source < 0 and _has_memory(pipe, name):
+            other[name] = np.array(pipe.read(name))
+    for index, bound in pipe._fed.items():
+        if bound.on_device:
+            raise ValueError("expected sources in the host's memory to compare with")
+        other.feed(index, bound.array)
+    try:
+        other.run()
+    except RunError as error:
+        return str(error)
+    return None
+
+
+def _has_memory(pipe: Pipeline, name: str) -> bool:
+    """Whether a buffer is bound; what no kernel uses need not be."""
+    bound = {one[0]: one[5] for one in pipe._core.states()}
+    return bound[name]
+
+
+def compare(
+    pipe: Pipeline, *, against: str = "reference", tolerance: float = 0.0
+) -> Comparison:
+    """Runs a pipeline and the same one for another target, by default the reference
+    executor, on copies of what is bound, and says where what they leave differs.
+
+    All bits count but padding and which NaN it is; numbers that differ by at most
+    `tolerance` are equal. `pipe` and its arrays stay as they are. Where the reference
+    takes long, so does this.
+    """
+    if not isinstance(pipe, Pipeline):
+        raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
+    if tolerance < 0:
+        raise ValueError("expected a tolerance of at least 0")
+    first = Pipeline(pipe.program.with_target(against))
+    second = Pipeline(pipe.program)
+    expected_error = _run_copy(pipe, first)
+    actual_error = _run_copy(pipe, second)
+    differences: List[Difference] = []
+    if expected_error is None and actual_error is None:
+        for name, state in pipe._states.items():
+            if state.kind == "constant" or not _has_memory(second, name):
+                continue
+            rank = state.rank
+            expected, actual = first.read(name), second.read(name)
+            for keys, field in _leaves(state.dtype):
+                a, b = expected, actual
+                for key in keys:
+                    a, b = a[key], b[key]
+                found = _compare_numbers(
+                    name,
+                    field,
+                    np.ascontiguousarray(a),
+                    np.ascontiguousarray(b),
+                    rank,
+                    tolerance,
+                )
+                if found:
+                    differences.append(found)
+    return Comparison(
+        pipe.program.target, against, tuple(differences), expected_error, actual_error
+    )

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""The fastest setting of a pipeline within an error, by piko-tune."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
+
+from ._compile import Program, Source
+from ._errors import Error
+from ._pipeline import Pipeline
+
+# Of piko.compile's options those that piko-tune has, by its names.
+_OPTIONS = {
+    "define": "-D",
+    "include-dir": "-I",
+    "without": "--without",
+    "cpu": "--cpu",
+    "cache-dir": "--cache-dir",
+}
+
+
+class TuneError(Error):
+    """piko-tune is not there, or has failed; `output` is what it wrote."""
+
+    def __init__(self, message: str, output: str = "") -> None:
+        super().__init__(message)
+        self.output = output
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What piko-tune chose. `piko.compile(..., tuned=...)` takes it, and so do the files
+    that `save` writes, for pikoc and piko-render, too.
+
+    `report` is what piko-tune says of how it found that, as docs/Tuning.md has it.
+    """
+
+    pipeline: str
+    tunables: Mapping[str, Any]
+    directives: Mapping[str, Any]
+    without: Sequence[str]
+    strip: int
+    mappings: str
+    measured: Mapping[str, Any]
+    report: Mapping[str, Any]
+    text: str
+    path: str
+
+    def save(self, path: Source) -> None:
+        Path(path).write_text(self.text)
+
+    def __fspath__(self) -> str:
+        return self.path
+
+
+def _find_tool() -> str:
+    """Beside the libraries, or on PATH."""
+    package = Path(__file__).resolve().parent
+    # PREFIX/lib/python3/dist-packages/piko, or BUILD/python/piko
+    for up in package.parents[:4]:
+        if (up / "bin" / "piko-tune").exists():
+            return str(up / "bin" / "piko-tune")
+    found = shutil.which("piko-tune")
+    if not found:
+        raise TuneError("expected piko-tune, which Piko's tools bring, on PATH")
+    return found
+
+
+def _arguments(program: Program) -> List[str]:
+    arguments = []
+    for name, value in program._options.settings:
+        if name in _OPTIONS:
+            word = _OPTIONS[name]
+            arguments += [word + value] if len(word) == 2 else [word, value]
+        elif (name, value) == ("cache", "off"):
+            arguments.append("--no-cache")
+        elif (name, value) not in (("target", "cpu"), ("opt-level", "3")):
+            if name != "pipe":
+                raise ValueError(f"piko-tune takes no program with {name} {value}")
+    return arguments
+
+
+def tune(
+    pipe: Pipeline,
+    *,
+    error: Union[str, float] = 0,
+    metric: str = "max",
+    budget: int = 500,
+    space: Sequence[str] = (),
+    threads: Optional[int] = None,
+    clock: str = "wall",
+    tool: Optional[Source] = None,
+) -> Tuned:
+    """Looks for the fastest setting of a pipeline, on what is bound to it now, of those
+    whose results differ by at most `error` (a number, or "1/255") from what the text
+    gives. Runs piko-tune on a capture, which takes as long as its frames: at most
+    `budget`. `space` are groups as docs/Tuning.md has them; `metric` is max, mean, rms,
+    p99 or flip; `clock` wall or cpu. TuneError has what piko-tune wrote.
+    """
+    if not isinstance(pipe, Pipeline):
+        raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
+    program = pipe.program
+    command = [os.fspath(tool) if tool is not None else _find_tool()]
+    folder = tempfile.mkdtemp(prefix="piko-tune-")
+    try:
+        source = program._options.source
+        if program._options.is_text:
+            source = os.path.join(folder, program._options.name)
+            Path(source).write_text(program._options.source)
+        capture = os.path.join(folder, "input.capture")
+        pipe.capture(capture)
+        out = os.path.join(folder, "tuned.json")
+        command += [source, capture, "--pipe", program.name, "--json", "--out", out]
+        command += ["--error", str(error), "--metric", metric]
+        command += ["--budget", str(budget), "--clock", clock]
+        command += ["--threads", str(pipe.threads if threads is None else threads)]
+        command += _arguments(program)
+        if space:
+            command += ["--space", ",".join(space)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise TuneError(done.stderr.strip() or "piko-tune has failed", done.stderr)
+        text = Path(out).read_text()
+        kept = _keep(text)
+        return _read(text, json.loads(done.stdout.splitlines()[-1]), kept)
+    except OSError as problem:
+        raise TuneError(f"cannot run piko-tune: {problem}") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _keep(text: str) -> str:
+    """A file that lasts as long as the process."""
+    handle, path = tempfile.mkstemp(prefix="piko-tuned-", suffix=".json")
+    with os.fdopen(handle, "w") as file:
+        file.write(text)
+    atexit.register(lambda: Path(path).unlink(missing_ok=True))
+    return path
+
+
+def _read(text: str, report: Dict[str, Any], path: str) -> Tuned:
+    setting = json.loads(text)
+    return Tuned(
+        setting["pipeline"],
+        setting.get("tunables", {}),
+        setting.get("directives", {}),
+        setting.get("without", []),
+        setting.get("strip", 0),
+        setting.get("mappings", ""),
+        setting.get("measured", {}),
+        report,
+        text,
+        path,
+    )

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""The manual's blocks run, in their order, and so do the example and the notebook."""
+
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+from support import HERE
+
+ROOT = HERE.parent.parent
+MANUAL = ROOT / "docs" / "Python.md"
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.S | re.M)
+
+
+class Documents(unittest.TestCase):
+    def run_program(self, *arguments, folder):
+        done = subprocess.run(
+            [sys.executable, *map(str, arguments)],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=100,
+        )
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def test_manual(self):
+        text = MANUAL.read_text()
+        program = ""
+        with tempfile.TemporaryDirectory() as folder:
+            for fence in FENCE.finditer(text):
+                kind, body = fence.groups()
+                if kind == "cpp":
+                    before = text[: fence.start()]
+                    name = re.findall(r"`([\w.]+\.piko\.cpp)`", before)[-1]
+                    (Path(folder) / name).write_text(body)
+                elif kind == "python":
+                    line = text[: fence.start()].count("\n") + 1
+                    program += "\n" * (line - program.count("\n")) + body
+            self.assertGreater(program.count("\n"), 100)
+            path = Path(folder) / "manual.py"  # with the manual's lines
+            path.write_text(program)
+            self.run_program("-W", "error", path, folder=folder)
+
+    def test_example(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tour = ROOT / "examples" / "python" / "tour.py"
+            out = self.run_program(tour, "dots.ppm", folder=folder).splitlines()
+            picture = (Path(folder) / "dots.ppm").read_bytes()
+        self.assertIn("draw: 60 taken, bins of (16, 16)", out)
+        self.assertIn("cpu against gpu-on-cpu: equal", out)
+        self.assertIn("CompileError: dots.piko.cpp:28: 1", out)
+        self.assertTrue(picture.startswith(b"P6\n128 128\n255\n"))
+        self.assertEqual(len(picture), 15 + 3 * 128 * 128)
+        self.assertGreater(len(set(picture)), 100)  # shades
+
+    def test_notebook(self):
+        notebook = ROOT / "examples" / "python" / "bubbles.ipynb"
+        out = self.run_program(HERE / "run_notebook.py", notebook, folder=HERE)
+        self.assertEqual(out.count("<picture of "), 3)
+        self.assertIn("\n1 picture\n", out)
+        self.assertIn("\ncpu against reference: equal\n", out)
+        self.assertRegex(out, r"bubbles\.piko\.cpp:\d+:\d+: error: no member named")
+        self.assertIn("source 'draw': field 'center': expected (2,) of float32", out)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Comparing with the reference executor, and tuning."""
+
+import os
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import piko
+from support import DOTS, make_pipe
+
+# With a square root that need not be exact, and values that are none.
+ROOTS = """#include <piko.h>
+constexpr int steps = piko::tunable("steps", 400, 4);
+struct State { piko::Buffer<glm::vec2> roots; };
+struct Root : piko::Stage<0, 0, 64, float>, piko::Uses<State> {
+  void schedule(piko::BinId) { specifyPrecision(piko::Precision::Relaxed); }
+  void process(const float &x) {
+    float sum = 0;
+    for (int i = 0; i < steps; ++i)
+      sum += piko::sqrt(x + float(i % 4));
+    state().roots[piko::toInt(x)] = glm::vec2(x / (x + 3.0f), sum / float(steps));
+  }
+};
+struct Roots : piko::Pipe<State> {
+  Root root;
+  Roots() { source(root); }
+};
+"""
+
+
+class Compare(unittest.TestCase):
+    def test_equal(self):
+        pipe = make_pipe(opt_level=0)
+        before = pipe["weights"].copy()
+        found = piko.compare(pipe)
+        self.assertTrue(found, str(found))
+        self.assertEqual(str(found), "cpu against reference: equal")
+        np.testing.assert_array_equal(pipe["weights"], before)
+        self.assertTrue(piko.compare(pipe, against="gpu-on-cpu"))
+
+    def test_different(self):
+        roots = np.zeros((64, 2), "f4")
+        pipe = piko.Pipeline(ROOTS, domain=(1, 1), roots=roots, opt_level=0)
+        pipe.feed("root", np.arange(64, dtype="f4"))
+        found = piko.compare(pipe)
+        self.assertFalse(found)
+        (first, *_) = found.differences
+        self.assertEqual((first.state, first.field), ("roots", ""))
+        self.assertEqual(len(first.index), 1)
+        self.assertNotEqual(first.expected, first.actual)
+        self.assertGreater(first.count, 0)
+        self.assertLess(first.largest, 1e-4)
+        self.assertRegex(str(found), r"roots\[\d+\]: expected \[.*\], but got \[.*\]; ")
+        self.assertTrue(piko.compare(pipe, tolerance=1e-4))
+        self.assertEqual(pipe["roots"].tolist(), [[0, 0]] * 64)
+        with self.assertRaises(ValueError):
+            piko.compare(pipe, tolerance=-1)
+        for function in (piko.compare, piko.tune):
+            with self.assertRaisesRegex(TypeError, "expected a pipeline, but got int"):
+                function(3)
+
+    def test_errors(self):
+        """Both end alike, or that is the difference."""
+        pipe = piko.Pipeline(DOTS, "Outside", domain=(1, 1), values=[0], opt_level=0)
+        pipe.feed("store", [3])
+        found = piko.compare(pipe, against="gpu-on-cpu")
+        self.assertTrue(found, str(found))
+        self.assertIn("stage 'store'", found.actual_error)
+
+
+class Tune(unittest.TestCase):
+    def make(self):
+        pipe = piko.Pipeline(ROOTS, domain=(1, 1), roots=np.zeros((4096, 2), "f4"))
+        pipe.feed("root", np.arange(4096, dtype="f4"))
+        pipe.threads = 1
+        return pipe
+
+    def test_tunables(self):
+        """A hundredth of the steps gives nearly the same."""
+        tuned = piko.tune(
+            self.make(), error=0.5, space=["tunables"], budget=40, clock="cpu"
+        )
+        self.assertEqual((tuned.pipeline, tuned.tunables), ("Roots", {"steps": 4}))
+        self.assertEqual(tuned.report["chosen"], "Roots steps=4")
+        self.assertIn("ms", tuned.measured)
+        program = piko.compile(ROOTS, tuned=tuned)
+        self.assertEqual(
+            program.code_hash, piko.compile(ROOTS, tunables={"steps": 4}).code_hash
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            tuned.save(Path(folder) / "tuned.json")
+            again = piko.compile(ROOTS, tuned=os.path.join(folder, "tuned.json"))
+            self.assertEqual(again.code_hash, program.code_hash)
+
+    def test_errors(self):
+        with self.assertRaises(piko.TuneError) as caught:
+            piko.tune(self.make(), metric="none")
+        self.assertIn("expected max, mean, rms", str(caught.exception))
+        with self.assertRaisesRegex(piko.TuneError, "cannot run piko-tune"):
+            piko.tune(self.make(), tool="/nonexistent/piko-tune")
+        pipe = piko.Pipeline(ROOTS, tunables={"steps": 4})
+        with self.assertRaisesRegex(ValueError, "takes no program with tunable"):
+            pipe.domain = (1, 1)
+            pipe.allocate("roots", 1)
+            piko.tune(pipe)
+
+
+if __name__ == "__main__":
+    unittest.main()
