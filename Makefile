@@ -97,6 +97,11 @@ charts: configure
 	@/usr/bin/python3 benchmarks/speed-error.py --bin $(BUILD)/bin \
 	  --out $(BUILD)/charts $(CHARTS)
 
+# The Python module for pip, in build/wheel.
+.PHONY: wheel
+wheel: build
+	@/usr/bin/python3 utils/make-wheel.py --build $(BUILD) --out $(BUILD)/wheel
+
 check: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 
