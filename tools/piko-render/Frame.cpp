@@ -21,8 +21,9 @@ static Result<SceneInput> loadCapture(const Options &options) {
   auto fail = [&](const std::string &why) {
     return Error{"capture '" + options.scene + "': " + why};
   };
-  if (!options.sceneOption.empty())
-    return fail(options.sceneOption + " is an option of scenes");
+  for (const std::string &option : {options.sizeOption, options.sceneOption})
+    if (!option.empty())
+      return fail(option + " is an option of scenes");
   auto capture = replay::readCapture(options.scene);
   if (!capture)
     return capture.error();
@@ -33,9 +34,26 @@ static Result<SceneInput> loadCapture(const Options &options) {
   return scene;
 }
 
+/// Primitives in the place of a scene.
+static Result<SceneInput> loadPrimitives(const Options &options) {
+  if (!options.sceneOption.empty())
+    return Error{"table '" + options.scene + "': " + options.sceneOption +
+                 " is an option of scenes"};
+  auto table = loadTable(options.scene);
+  if (!table)
+    return table.error();
+  SceneInput scene{};
+  scene.size = {options.view.width, options.view.height};
+  scene.values = options.values;
+  scene.table = std::move(*table);
+  return scene;
+}
+
 Result<SceneInput> render::loadScene(const Options &options) {
   if (replay::isCaptureFile(options.scene))
     return loadCapture(options);
+  if (isTableFile(options.scene))
+    return loadPrimitives(options);
   Progress bar("loading " + options.scene);
   auto mesh = loadMesh(options.scene, [&](double part) { bar.update(part); });
   if (!mesh)

@@ -10,6 +10,7 @@ using namespace piko::render;
 namespace {
 
 constexpr int maxInt = 1'000'000'000;
+const std::string ofSizes = "Of scenes and tables";
 const std::string ofScenes = "Of scenes only";
 
 void setTarget(const std::string &name, LoadOptions &load) {
@@ -236,7 +237,8 @@ void render::addSceneOptions(CommandLine &line, Options &options) {
   line.addText("PIPELINE", "", options.pipeline,
                "the text of a pipeline, or a library of what pikoc made of it");
   line.addText("SCENE", "", options.scene,
-               "what is rendered, or what a host fed and bound");
+               "what is rendered, a table of primitives (.csv), or what a host "
+               "fed and bound");
   LoadOptions &load = options.load;
   line.addText("--cpu", "NAME", load.cpu,
                "the processor to compile for, as clang names them, of which "
@@ -267,10 +269,12 @@ void render::addSceneOptions(CommandLine &line, Options &options) {
   line.addNumber("--strip", "N", options.stripSize,
                  "primitives of a source in a strip (0, what fits)", 0);
 
-  line.beginGroup(ofScenes);
+  line.beginGroup(ofSizes);
   line.addNumber("--width", "W", options.view.width, "pixels of a row (1024)",
                  1, 65536);
   line.addNumber("--height", "H", options.view.height, "rows (768)", 1, 65536);
+
+  line.beginGroup(ofScenes);
   line.addNumber("--lights", "L", options.lights,
                  "number of lights, 0 for none (1)", 0, 1'000'000);
   addPoint(line, "--eye", options.view.eye,
@@ -289,6 +293,7 @@ void render::addSceneOptions(CommandLine &line, Options &options) {
 }
 
 std::string render::checkOptions(const CommandLine &line, Options &options) {
+  options.sizeOption = line.findOption(ofSizes);
   options.sceneOption = line.findOption(ofScenes);
   return findProblem(options);
 }
@@ -296,10 +301,13 @@ std::string render::checkOptions(const CommandLine &line, Options &options) {
 Result<Options> render::parseOptions(const std::vector<std::string> &words) {
   CommandLine line(
       "piko-render [options] FILE.piko.cpp SCENE\n"
+      "piko-render [options] FILE.piko.cpp TABLE.csv\n"
       "piko-render [options] FILE.piko.cpp CAPTURE",
       "Compiles a pipeline that uses the types of piko/scene.h, renders a "
-      "scene with it, and says how long a frame took. Or runs any pipeline on "
-      "what an application has fed and bound, which pikort_capture or "
+      "scene with it, and says how long a frame took. Or feeds it a table of "
+      "primitives, whose first line has the names of their fields. Or runs any "
+      "pipeline on what an application has fed and bound, which pikort_capture "
+      "or "
       "$PIKO_CAPTURE has written. In place of the text there may be what was "
       "compiled ahead of time: FILE.so, a shared library of pikoc's objects, "
       "each of which runs on what it was made for.",

@@ -14,6 +14,7 @@ namespace piko::render {
 struct Options {
   std::string help; ///< the text, if that is asked for
   std::string pipeline, scene;
+  std::string sizeOption;  ///< the first one that captures do not have
   std::string sceneOption; ///< the first one that only scenes have
   LoadOptions load;
   std::string tuned; ///< the file of a setting that piko-tune wrote

@@ -140,7 +140,7 @@ Result<Done> rerun(const Options &options, pikort_pipeline *pipeline) {
 }
 
 int64_t countPrimitives(const SceneInput &scene) {
-  int64_t count = 0;
+  int64_t count = scene.table ? int64_t(scene.table->lines.size()) : 0;
   if (scene.capture)
     for (const rt::Capture::Records &source : scene.capture->sources)
       count += source.count;

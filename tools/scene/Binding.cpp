@@ -60,6 +60,9 @@ private:
     for (int32_t i = 0; i < pikort_source_count(pipeline); ++i)
       if (auto ok = bindSource(i); !ok)
         return ok.error();
+    if (scene.table && fed < 0)
+      return fail("expected a source for table '" + scene.table->path +
+                  "' whose primitives no scene has, but it has none");
     if (auto ok = setConstants(); !ok)
       return ok.error();
     if (output.empty())
@@ -112,6 +115,11 @@ private:
     bool isOfMesh = isOfTree || !std::strcmp(type, "piko::scene::Vertex") ||
                     !std::strcmp(type, "piko::scene::Triangle");
     bool isOfPatches = !std::strcmp(type, "piko::scene::Patch");
+    bool isOfView = !std::strcmp(type, "piko::scene::Camera") ||
+                    !std::strcmp(type, "piko::scene::Light");
+    if (scene.table && (isOfMesh || isOfPatches || isOfView))
+      return fail("'" + std::string(type) + "': expected a scene, but '" +
+                  scene.table->path + "' is a table");
     bool hasPatches = !scene.mesh.patches.empty();
     if (isOfMesh && hasPatches)
       return fail("'" + std::string(type) +
@@ -166,6 +174,25 @@ private:
     if (!std::strcmp(type, "piko::scene::Nothing"))
       return {nullptr, 0, sizeof(scene::Nothing)};
     return meshFor(type);
+  }
+
+  /// The table's lines, for a source of a type that no scene has.
+  Result<Supply> supplyTable(int32_t source, int32_t record,
+                             const std::string &type) {
+    if (fed >= 0)
+      return fail("expected one source for table '" + scene.table->path +
+                  "', but " + std::to_string(fed) + " and " +
+                  std::to_string(source) + " take what no scene has");
+    fed = source;
+    auto known = scene.records.find(type);
+    if (known == scene.records.end()) {
+      auto records = makeRecords(*scene.table, pipeline, record);
+      if (!records)
+        return fail(records.error().message);
+      known = scene.records.emplace(type, std::move(*records)).first;
+    }
+    TableRecords &records = known->second;
+    return Supply{records.memory.data(), records.count, records.size};
   }
 
   Result<Done> bindState(const pikort_state_info &state) {
@@ -270,11 +297,17 @@ private:
     if (auto ok = prepare(record->name); !ok)
       return ok.error();
     Supply supply = sourceFor(record->name);
+    if (!supply.size && scene.table) {
+      auto lines = supplyTable(index, source.record, record->name);
+      if (!lines)
+        return lines.error();
+      supply = *lines;
+    }
     if (!supply.size)
       return fail(unsuitable("source " + std::to_string(index), record->name,
                              "'piko::scene::Vertex', '...::Triangle', "
-                             "'...::Patch', '...::Pixel' or "
-                             "'...::Nothing'"));
+                             "'...::Patch', '...::Pixel', '...::Nothing' or a "
+                             "table in the place of the scene"));
     if (pikort_bind_source(pipeline, index, supply.data, supply.count,
                            supply.size) != PIKORT_OK)
       return lastError();
@@ -284,6 +317,7 @@ private:
   pikort_pipeline *pipeline;
   SceneInput &scene;
   std::string output;
+  int32_t fed = -1; ///< the source that the table feeds
 };
 
 } // namespace

@@ -100,6 +100,10 @@ protected:
     return result ? "no error" : result.error().message;
   }
 
+  static Table tableOfNumbers() {
+    return {"numbers.csv", nullptr, {"number"}, {"7", "-8"}, {2, 3}};
+  }
+
   SceneInput input{};
   pikort_pipeline *pipeline = nullptr;
 };
@@ -275,8 +279,8 @@ TEST_F(Binding, UnknownSource) {
               declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
             }),
             "pipeline 'Test': source 0: expected 'piko::scene::Vertex', "
-            "'...::Triangle', '...::Patch', '...::Pixel' or '...::Nothing', "
-            "but got 'Other'");
+            "'...::Triangle', '...::Patch', '...::Pixel', '...::Nothing' or a "
+            "table in the place of the scene, but got 'Other'");
 }
 
 TEST_F(Binding, Patches) {
@@ -311,6 +315,57 @@ TEST_F(Binding, SceneOfPatchesAlone) {
             }),
             "pipeline 'Test': 'piko::scene::Vertex': expected a scene of "
             "triangles, but it has patches");
+}
+
+// Primitives of the pipeline's own, beside a source that every picture has.
+TEST_F(Binding, Tables) {
+  input.table = tableOfNumbers();
+  auto output = bind([](pikort_pipeline *p) {
+    pikoir_declare_field(p, OTHER, "number", PIKORT_I32, 0, 1, 4);
+    declareSource(p, 0, PIXEL);
+    declareSource(p, 1, OTHER);
+    declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
+  });
+  ASSERT_TRUE(output) << output.error().message;
+  pikort_source_info source;
+  ASSERT_EQ(pikort_get_source_info(pipeline, 1, &source), PIKORT_OK);
+  EXPECT_EQ(source.count, 2);
+  auto *numbers =
+      reinterpret_cast<const int32_t *>(input.records["Other"].memory.data());
+  EXPECT_EQ(numbers[0], 7);
+  EXPECT_EQ(numbers[1], -8);
+}
+
+TEST_F(Binding, TablesThatFeedNothing) {
+  input.table = tableOfNumbers();
+  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
+              declareSource(p, 0, PIXEL);
+              declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
+            }),
+            "pipeline 'Test': expected a source for table 'numbers.csv' whose "
+            "primitives no scene has, but it has none");
+}
+
+TEST_F(Binding, TablesForTwo) {
+  input.table = tableOfNumbers();
+  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
+              pikoir_declare_field(p, OTHER, "number", PIKORT_I32, 0, 1, 4);
+              declareSource(p, 0, OTHER);
+              declareSource(p, 1, OTHER);
+              declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
+            }),
+            "pipeline 'Test': expected one source for table 'numbers.csv', but "
+            "0 and 1 take what no scene has");
+}
+
+TEST_F(Binding, TablesHaveNoCamera) {
+  input.table = tableOfNumbers();
+  EXPECT_EQ(errorOf([](pikort_pipeline *p) {
+              declareState(p, 0, "camera", PIKORT_CONSTANT, CAMERA);
+              declareState(p, 1, "color", PIKORT_IMAGE, COLOR, 2);
+            }),
+            "pipeline 'Test': 'piko::scene::Camera': expected a scene, but "
+            "'numbers.csv' is a table");
 }
 
 // Counted once for each element; a run clears them.

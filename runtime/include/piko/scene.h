@@ -21,7 +21,11 @@
 //                                             stage with everyBin() takes
 //   the Image<Color>                          the result: there is exactly one
 //
-// Each may occur any number of times (the Image<Color> once) or not at all.
+// Each may occur any number of times (the Image<Color> once) or not at all. In
+// the place of a scene there may be a table, NAME.csv, which has no camera,
+// light or mesh: it feeds the one source of any other type, whose fields its
+// first line names, a primitive of each further line.
+//
 // A host-bound buffer, a constant without a default value or a source of any
 // other type is an error, because nothing could fill it. State that the
 // pipeline allocates or clears itself and constants with a default value are
