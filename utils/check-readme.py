@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""check-readme.py README.md: the commands of the first page are targets of the Makefile, and
-the figures of its table stand on the pages of results that the rows link to."""
+"""check-readme.py README.md: the commands of the first page are targets of the Makefile,
+and the figures of its table stand on the pages of results that the rows link to."""
 
 import pathlib
 import re

@@ -7,7 +7,7 @@ printed and the pictures.
   check-tutorial.py --piko build --work FOLDER examples/lessons/01-dots/README.md
 
 The last file named in backquotes before a ```cpp, ```cmake or ```mlir fence, but for
-headers that are made, is the one that the fence holds. Of a lesson, a page with files
+headers that are made, is the one that the fence holds; a lesson's goes on where none is. Of a lesson, a page with files
 beside it, these are copied first, and such a fence is a part of that file. The ```sh
 fences are run by one shell, those that say ```sh fails must fail; a ```text fence is
 what the commands of the last ```sh fence print, with lines left out, and "..." for
@@ -23,9 +23,8 @@ import re
 import shutil
 import subprocess
 import sys
-import textwrap
 
-FENCE = re.compile(r"^ *```(\w+)( fails)?\n(.*?)^ *```", re.S | re.M)
+FENCE = re.compile(r"^( *)```(\w+)( fails)?\n(.*?)^ *```", re.S | re.M)
 NAME = re.compile(r"`([\w.-]+\.\w+)`")
 PICTURE = re.compile(r"!\[[^]]*\]\(([\w.-]+\.png)\)|<img src=\"([\w.-]+\.png)\"")
 HOLDS = ("cpp", "cmake", "mlir", "csv")
@@ -55,8 +54,8 @@ class Page:
         self.is_lesson = path.stem not in FILES
         end = 0
         for fence in FENCE.finditer(self.text):
-            kind, fails, body = fence.groups()
-            body = textwrap.dedent(body)
+            space, kind, fails, body = fence.groups()
+            body = re.sub(f"^{space}", "", body, flags=re.M)
             if kind == "sh":
                 self.commands.append((bool(fails), body))
             elif kind == "text":
@@ -74,6 +73,9 @@ class Page:
             return self.is_lesson and (self.path.parent / name).exists()
 
         names = [n for n in NAME.findall(before) if n[-2:] != ".h" or is_beside(n)]
+        if not names and self.shown:
+            self.shown.append((self.shown[-1][0], body))
+            return
         if not names:
             sys.exit(f"{self.path}: expected the name of a file before:\n{body}")
         if is_beside(names[-1]):
@@ -92,11 +94,15 @@ class Page:
         for name, body in self.shown:
             if body not in (self.path.parent / name).read_text():
                 yield f"expected a part of {name}, but got:\n{body}"
-        # Lines of a pipeline that no fence shows, but for that of the licence.
+        # Lines of a pipeline that no fence shows, but for that of the licence and those
+        # of other lessons.
+        known = {line for path in self.path.parent.parent.glob("*/*.piko.cpp")
+                 if path.parent != self.path.parent
+                 for line in path.read_text().splitlines()}
         for name in {name for name, _ in self.shown if name.endswith(".piko.cpp")}:
             lines = (self.path.parent / name).read_text().splitlines()[1:]
             shown = {l for n, body in self.shown if n == name for l in body.splitlines()}
-            hidden = [line for line in lines if line not in shown]
+            hidden = [line for line in lines if line not in shown | known]
             if hidden:
                 yield f"expected all of {name}, but these lines are missing: {hidden}"
 

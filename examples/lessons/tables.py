@@ -78,6 +78,15 @@ def hills(count=70):
                f"{draw.uniform(-0.10, 0.16) * radius / 30:.3f}")
 
 
+def rose(count=2400, layers=5):
+    """Roses of seven petals, one in the other, in 192 x 144 pixels; a hue for each dot."""
+    for i in range(count):
+        turn, layer = math.tau * i / count, (i % layers + 1) / layers
+        away = layer * (14 + 54 * abs(math.cos(3.5 * turn)))
+        yield (f"{96 + away * math.cos(turn):.1f}", f"{72 + away * math.sin(turn):.1f}",
+               f"{layer * abs(math.cos(3.5 * turn)):.3f}")
+
+
 TABLES = {
     "01-dots/stars.csv": ("position.x,position.y,color.x,color.y,color.z", stars, 1500),
     "02-bins/discs.csv": ("center.x,center.y,radius,color.x,color.y,color.z", discs, None),
@@ -85,6 +94,7 @@ TABLES = {
                             None),
     "04-lists/sites.csv": ("position.x,position.y,color.x,color.y,color.z", sites, None),
     "05-waits/hills.csv": ("center.x,center.y,radius,height", hills, None),
+    "12-mlir/rose.csv": ("position.x,position.y,hue", rose, None),
 }
 
 
