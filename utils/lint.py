@@ -10,6 +10,7 @@ layers    the runtime's common part knows nothing of the targets' parts, nor the
 folders   none has more files than a reader looks through
 classes   none has more functions than that
 words     terms are the field's: none of those of utils/words.txt
+links     documents link to files and headings that there are
 tidy      clang-tidy over the compile commands of a build (--build DIR), or over
           the files without headers of LLVM, a folder at a time (--quick)
 all       all but the last
@@ -204,6 +205,43 @@ def classes():
     return faults
 
 
+LINK = re.compile(r"\]\(([^)\s]+)\)|(?:src|href)=\"([^\"]+)\"")
+FENCED = re.compile(r"^ *```.*?^ *```", re.S | re.M)
+
+
+def anchors(text):
+    """What links within a document can name, as GitHub makes it of headings."""
+    found = set(re.findall(r"<a (?:id|name)=\"([^\"]+)\"", text))
+    for heading in re.findall(r"^#+ (.+)$", FENCED.sub("", text), re.M):
+        heading = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)
+        name = re.sub(r"[^\w\- ]", "", heading.lower().strip()).replace(" ", "-")
+        number = 0
+        while (unique := f"{name}-{number}" if number else name) in found:
+            number += 1
+        found.add(unique)
+    return found
+
+
+def links():
+    faults, known = 0, {}
+    for name in sources():
+        if not name.endswith(".md"):
+            continue
+        text = (ROOT / name).read_text()
+        for link in LINK.finditer(FENCED.sub("", text)):
+            target = link[1] or link[2]
+            if re.match(r"\w+:", target):
+                continue
+            file, _, anchor = target.partition("#")
+            path = (ROOT / name).parent / file if file else ROOT / name
+            if path.suffix == ".md" and path.is_file() and path not in known:
+                known[path] = anchors(path.read_text())
+            if not path.exists() or anchor and anchor not in known.get(path, ()):
+                print(f"{name}: nothing is where '{target}' leads to")
+                faults += 1
+    return faults
+
+
 WORDS = "utils/words.txt"
 # Comments go from line to line.
 JOINED = re.compile(r"\s*\n\s*(?://+<?|#+|\*)?\s*")
@@ -346,7 +384,7 @@ def main():
     parser.add_argument(
         "check",
         choices=["format", "licence", "paths", "layers", "folders", "classes",
-                 "words", "tidy", "all"],
+                 "words", "links", "tidy", "all"],
     )
     parser.add_argument("--fix", action="store_true")
     parser.add_argument("--build", default="build")
@@ -361,11 +399,12 @@ def main():
         "folders": folders,
         "classes": classes,
         "words": words,
+        "links": links,
         "tidy": lambda: (tidy_quick if args.quick else tidy)(args.build, args.jobs),
     }
     names = [args.check]
     if args.check == "all":
-        names = ["format", "licence", "paths", "layers", "folders", "classes", "words"]
+        names = [name for name in checks if name != "tidy"]
     faults = [name for name in names if checks[name]()]
     sys.exit(1 if faults else 0)
 
