@@ -3,15 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <vector>
 
 using pipelines::Sunflower;
 
 // Each seed is turned by the golden angle against the one before it.
-static std::vector<Sunflower::Seed> grow(int count) {
-  std::vector<Sunflower::Seed> seeds;
+static std::vector<Sunflower::Disc> grow(int count) {
+  std::vector<Sunflower::Disc> seeds;
   for (int i = 0; i < count; ++i) {
     float part = float(i) / float(count), angle = 2.399963f * float(i);
     float away = 88 * std::sqrt(part);
@@ -24,22 +23,17 @@ static std::vector<Sunflower::Seed> grow(int count) {
 }
 
 int main() {
-  std::vector<Sunflower::Seed> seeds = grow(420);
+  std::vector<Sunflower::Disc> seeds = grow(420);
   Sunflower pipe;
   pipe.setDomain({256, 192});
   pipe.state().light = {-0.5f, -0.5f, 0.7f};
   pipe.feed(pipe.draw, seeds);
-  if (auto status = pipe.run(); !status) {
-    std::fprintf(stderr, "sunflower: %s\n", status.message().c_str());
-    return 1;
-  }
+  pipe.run();
 
   std::ofstream file("sunflower.ppm", std::ios::binary);
   file << "P6\n256 192\n255\n";
   for (const Sunflower::Color &pixel : pipe.state().image.view().elements)
     for (int channel = 0; channel < 3; ++channel)
       file.put(char(std::clamp(pixel.rgba[channel], 0.0f, 1.0f) * 255 + 0.5f));
-  std::printf("%zu seeds on %d threads\n", seeds.size(),
-              pikort_threads(pipe.get()));
   return file.flush() ? 0 : 1;
 }

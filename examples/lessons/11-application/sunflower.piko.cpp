@@ -2,7 +2,7 @@
 #include <piko.h>
 #include <piko/scene.h>
 
-struct Seed {
+struct Disc {
   glm::vec2 center;
   float radius;
   glm::vec3 color;
@@ -13,15 +13,15 @@ struct Field {
   piko::Image<piko::scene::Color> image;
 };
 
-struct Draw : piko::Stage<16, 16, 64, Seed>, piko::Uses<Field> {
-  void assignBin(const Seed &seed) {
-    assignToBoundingBox(seed, seed.center - seed.radius,
-                        seed.center + seed.radius);
+struct Draw : piko::Stage<16, 16, 64, Disc>, piko::Uses<Field> {
+  void assignBin(const Disc &disc) {
+    assignToBoundingBox(disc, disc.center - disc.radius,
+                        disc.center + disc.radius);
   }
 
-  void process(const Seed &seed) {
+  void process(const Disc &disc) {
     parallelForPixels([&](glm::ivec2 p) {
-      glm::vec2 at = (glm::vec2(p) + 0.5f - seed.center) / seed.radius;
+      glm::vec2 at = (glm::vec2(p) + 0.5f - disc.center) / disc.radius;
       float inside = 1 - glm::dot(at, at);
       if (inside < 0)
         return;
@@ -29,7 +29,7 @@ struct Draw : piko::Stage<16, 16, 64, Seed>, piko::Uses<Field> {
       float light = glm::dot(normal, state().light);
       light = glm::max(glm::ceil(light * 5) / 5, 0.2f);
       update(state().image, p, [&](piko::scene::Color &pixel) {
-        pixel.rgba = glm::vec4(seed.color * light, 1);
+        pixel.rgba = glm::vec4(disc.color * light, 1);
       });
     });
   }
