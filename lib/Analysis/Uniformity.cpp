@@ -271,6 +271,10 @@ bool Uniformity::visit(Operation *op) {
     return visitArrayAccess(op);
   Uniform level = get(op->getOperands());
   auto load = dyn_cast<LoadOp>(op);
+  if (auto elect = dyn_cast<ElectOp>(op)) {
+    bool changed = mark(elect.getSide(), std::min(level, Uniform::Item));
+    return mark(elect.getTakes(), level) || changed;
+  }
   if (isa<ReduceOp>(op)) // one result for all iterations
     level = Uniform::Item;
   else if (load ? written.contains(load.getStateAttr())

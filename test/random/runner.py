@@ -20,7 +20,7 @@ EQUAL, BLANK = "equal", "equal, but blank"
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-gbuffer",
           "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
-          "lockstep", "flatten-nests", "compact-loops",
+          "lockstep", "flatten-nests", "merge-nests", "compact-loops",
           "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
           "narrow-integers", "merge-gathers", "pair-gathers", "if-convert",
           "unswitch-versions",

@@ -15,6 +15,9 @@ struct CPUOptions {
   int64_t lanes = 16;
   /// For who fits the cost model: see piko-plan-vectors.
   bool printsSensitivities = false;
+  /// Merges nests of loops where that is expected to take no more than this
+  /// share of what else does; for tests, more than 1.
+  double mergeGain = 0.9;
 };
 
 } // namespace piko

@@ -106,7 +106,8 @@ def PlanVectors : Pass<"piko-plan-vectors", "::piko::PipelineOp"> {
     **Does**: compares vectors with scalar code by a cost model, unless `specifyLanes`
     decides, for loops over primitives, parallel loops, and loops in order whose
     iterations are independent. Those that win are marked for `piko-vectorize`. First,
-    inner loops that lanes leave at different times are flattened or collapsed, and
+    inner loops that lanes leave at different times are flattened, collapsed, or merged
+    with those around them (loop merging with iteration delaying, `piko.cpu.elect`), and
     iterations with nothing to do taken out by stream compaction, where that pays; a
     loop that appends to lists pushes (`piko.storage.push`), to be compacted likewise. Short
     loops keep a scalar version. With a `window`, loops with close estimates have two
@@ -141,6 +142,9 @@ def PlanVectors : Pass<"piko-plan-vectors", "::piko::PipelineOp"> {
            "only loops of what lanes do in turns, after piko-vectorize">,
     Option<"flattens", "flatten", "bool", "true",
            "flatten nests that lanes leave at different times">,
+    Option<"mergeGain", "merge-gain", "double", "0.9",
+           "merge nests where that is expected to take no more than this share of "
+           "what else does">,
     Option<"compacts", "compact", "bool", "true",
            "compact loops of which some iterations have nothing to do">,
     Option<"window", "window", "double", "1",

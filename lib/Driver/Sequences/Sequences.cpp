@@ -198,6 +198,7 @@ void piko::addVectorSequence(OpPassManager &passes,
     plan.laneCount = cpu.lanes;
     plan.window = options.mappingWindow;
     plan.flattens = options.has("flatten-nests");
+    plan.mergeGain = options.has("merge-nests") ? cpu.mergeGain : 0;
     plan.compacts = options.has("compact-loops");
     plan.sensitivities = cpu.printsSensitivities;
     // What one lane after the other does may have vectors of its own, and lanes
@@ -276,6 +277,11 @@ struct CPUSequenceOptions : PassPipelineOptions<CPUSequenceOptions> {
                              llvm::cl::desc("Print what these estimates depend "
                                             "on, as lines of JSON"),
                              llvm::cl::init(false)};
+  Option<double> mergeGain{
+      *this, "merge-gain",
+      llvm::cl::desc("Merge nests of loops where that is expected to take no "
+                     "more than this share of what else does"),
+      llvm::cl::init(CPUOptions().mergeGain)};
 };
 
 struct GridSequenceOptions : PassPipelineOptions<GridSequenceOptions> {
@@ -321,7 +327,8 @@ void piko::registerSequences() {
         synthesis.mappingWindow = options.window;
         addCPUSequence(passes, synthesis,
                        {.lanes = options.lanes,
-                        .printsSensitivities = options.sensitivities});
+                        .printsSensitivities = options.sensitivities,
+                        .mergeGain = options.mergeGain});
       });
   PassPipelineRegistration<>("piko-cpu-to-llvm",
                              "From upstream dialects to llvm and omp",

@@ -301,6 +301,8 @@ bool LaneCandidate::paysInPairs(const IterationLanes &lanes,
                                 const FlatLoop &flat) const {
   if (!ofPrimitives || lanes.getLaneCount() != widestLanes || asksAhead(loop))
     return false;
+  if (flat.isMerged) // Its state fills the registers.
+    return false;
   if (!flat.loop)
     return isBoundByLatency(lanes);
   return !isOneVector(flat.loop, widestLanes) &&
@@ -317,8 +319,11 @@ void LaneCandidate::remarkVectors(const IterationLanes &lanes,
     remark << "these iterations are vectorized for " << lanes.getLaneCount()
            << " at once";
   for (Location nest : flat.nests)
-    remark.attachNote(nest) << "lanes go on in this loop each by itself, "
-                               "however often the loop inside iterates";
+    remark.attachNote(nest)
+        << "lanes go on in this loop each by itself, "
+        << (flat.isMerged ? "and do what is around the loop inside when enough "
+                            "of them are done with that"
+                          : "however often the loop inside iterates");
   for (Location nest : flat.ordered)
     remark.attachNote(nest) << "lanes take turns to go through this loop, "
                                "because an order shows of what it does";

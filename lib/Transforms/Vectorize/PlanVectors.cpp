@@ -362,7 +362,7 @@ WalkResult PlanVectorsPass::visit(Operation *op) {
   IterationLanes lanes(copy, laneCount);
   FlatLoop flat;
   if (flattens && !lanes.getRefusal().at)
-    flat = flattenNests(lanes);
+    flat = flattenNests(lanes, mergeGain);
   bool isDone = candidate.decide(lanes, flat);
   if (sensitivities && isDone && candidate.getVersions())
     printSensitivities(loop, countMappings(loop), candidate, lanes, flat);

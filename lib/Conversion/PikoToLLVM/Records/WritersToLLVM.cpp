@@ -79,6 +79,19 @@ struct TakesVectorsLowering : Lowering<TakesVectorsOp> {
   }
 };
 
+/// One iteration has nobody to wait for.
+struct ElectLowering : Lowering<ElectOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(ElectOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    Value always = LLVM::ConstantOp::create(rewriter, op.getLoc(),
+                                            rewriter.getI1Type(), true);
+    rewriter.replaceOp(op, {adaptor.getCondition(), always});
+    return success();
+  }
+};
+
 struct LocalBinLowering : Lowering<LocalBinOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -293,13 +306,13 @@ struct PlaceLowering : Lowering<AppendBinOp> {
 void piko::populateWriterToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
-  patterns
-      .add<OpenWriterLowering, TakesVectorsLowering, LocalBinLowering,
-           WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
-           IsCountedLowering, WriterCallLowering<ReorderEndOp, reorderEnd>,
-           WriterNumberLowering<ReorderBeginOp, reorderBegin>,
-           WriterNumberLowering<ReorderIterationOp, reorderIteration>,
-           WriterNumberLowering<ScratchReleaseOp, scratchRelease>,
-           ScratchMarkLowering, ScratchLowering, AppendLowering, PlaceLowering>(
-          converter, patterns.getContext(), context);
+  patterns.add<
+      OpenWriterLowering, ElectLowering, TakesVectorsLowering, LocalBinLowering,
+      WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
+      IsCountedLowering, WriterCallLowering<ReorderEndOp, reorderEnd>,
+      WriterNumberLowering<ReorderBeginOp, reorderBegin>,
+      WriterNumberLowering<ReorderIterationOp, reorderIteration>,
+      WriterNumberLowering<ScratchReleaseOp, scratchRelease>,
+      ScratchMarkLowering, ScratchLowering, AppendLowering, PlaceLowering>(
+      converter, patterns.getContext(), context);
 }

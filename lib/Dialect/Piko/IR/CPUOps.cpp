@@ -48,6 +48,15 @@ LogicalResult TakesVectorsOp::verifySymbolUses(SymbolTableCollection &) {
              : success();
 }
 
+LogicalResult ElectOp::verify() {
+  constexpr int64_t all = 8;
+  int64_t eighths = getEighths();
+  if (eighths >= 1 && eighths <= all)
+    return success();
+  return emitOpError("expected from 1 to ")
+         << all << " eighths of the lanes, but got " << eighths;
+}
+
 /// A value and the storage that it is in are of one record.
 static LogicalResult verifyStored(Operation *op, BinsType bins,
                                   FlatSymbolRefAttr record, StringRef what) {

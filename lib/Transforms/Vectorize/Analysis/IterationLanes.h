@@ -51,6 +51,8 @@ public:
   /// How many iterations each lane makes of a loop that lanes leave at
   /// different times, as far as is known.
   double getOwnIterations(mlir::Operation *inner) const;
+  /// How many iterations a lane makes of any loop, as far as is known.
+  double getIterations(mlir::Operation *inner) const;
   /// How many iterations all lanes together make of a loop that is made of
   /// these two, as far as is known.
   double getFlatIterations(mlir::Operation *outer,

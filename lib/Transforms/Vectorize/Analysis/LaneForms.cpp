@@ -435,6 +435,8 @@ LaneForm LaneForms::getForm(Operation *op) const {
     return LaneForm::Uniform;
   if (isAccess(op) || isa<PushOp>(op))
     return LaneForm::Access;
+  if (isa<ElectOp>(op))
+    return LaneForm::Vector;
   if (hasVectorForm(op) && llvm::all_of(op->getOperandTypes(), isLaneType) &&
       llvm::all_of(op->getResultTypes(), isLaneType))
     return LaneForm::Vector;

@@ -48,7 +48,11 @@ public:
   IterationLanes::Cost cost;
 
   double getFlatIterations(Operation *outer, Operation *inner) const;
-  /// How many iterations a lane makes of a loop.
+  /// How many iterations one lane makes of a loop.
+  double getOfLane(Operation *loop) const {
+    return std::max(1.0, getIterations(loop) * getGoing(loop));
+  }
+  /// The same of a loop that it leaves at a time of its own.
   double getOwnIterations(Operation *loop) const;
 
 private:
@@ -189,7 +193,8 @@ Frequency CostModel::getFrequencyInside(Operation *loop, Region &region) const {
 void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   if (auto choice = dyn_cast<scf::IfOp>(op)) {
     Region &yes = choice.getThenRegion(), &no = choice.getElseRegion();
-    bool isState = op->getParentOp()->hasAttr(marks::iterations);
+    auto elect = choice.getCondition().getDefiningOp<ElectOp>();
+    bool isState = !elect && op->getParentOp()->hasAttr(marks::iterations);
     auto addSide = [&](Region &side, Region &other) {
       if (side.empty())
         return;
@@ -223,7 +228,8 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
     };
     addSide(yes, no);
     addSide(no, yes);
-    if (isState) // It is chosen.
+    bool isElected = elect && choice.getCondition() == elect.getTakes();
+    if (isState || isElected) // It is chosen.
       cost.vectors += times.vectors * cycles.vector * choice.getNumResults();
     bool isShort = lanes.isCheap(yes) && (no.empty() || lanes.isCheap(no));
     if (lanes.isVarying(choice.getCondition()) && !isShort)
@@ -446,6 +452,11 @@ void CostModel::addChase(LoadOp load, Frequency times, bool laneByLane) {
 void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
   if (isPrefetch(op) || isa<FailOp, FailListOp, FailDivideOp>(op))
     return; // free, or rare
+  if (isa<ElectOp>(op)) {
+    constexpr double counting = 14; // operations, and a branch
+    cost.vectors += counting * cycles.vector * times.vectors;
+    return;
+  }
   if (!laneByLane && lanes.isEmission(op))
     return addEmission(op, times);
   if (auto push = dyn_cast<PushOp>(op))
@@ -494,6 +505,10 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
 
 double IterationLanes::getOwnIterations(Operation *inner) const {
   return CostModel(*this).getOwnIterations(inner);
+}
+
+double IterationLanes::getIterations(Operation *inner) const {
+  return CostModel(*this).getOfLane(inner);
 }
 
 double IterationLanes::getFlatIterations(Operation *outer,

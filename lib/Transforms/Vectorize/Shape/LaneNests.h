@@ -17,6 +17,8 @@ struct FlatLoop {
   llvm::SmallVector<mlir::Location> nests = {};
   /// Others, which lanes go through one after the other, since an order shows.
   llvm::SmallVector<mlir::Location> ordered = {};
+  /// Whether lanes elect what they do in each turn.
+  bool isMerged = false;
   /// By which its primitives are to be counted by themselves.
   llvm::SmallVector<mlir::Value> writers = {};
 };
@@ -26,8 +28,9 @@ void countPrimitives(mlir::scf::ForOp loop, mlir::ValueRange writers);
 
 /// Flattens each nest whose inner loop lanes leave at different times, where
 /// that is expected to take less, and nothing of it is done in an order that
-/// shows; then iterations, each with its only loop.
-FlatLoop flattenNests(const IterationLanes &lanes);
+/// shows; then iterations, each with its only loop. Or merges a whole nest,
+/// where that is expected to take no more than `mergeGain` of what else does.
+FlatLoop flattenNests(const IterationLanes &lanes, double mergeGain);
 
 } // namespace piko
 

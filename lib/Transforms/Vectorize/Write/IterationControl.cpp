@@ -47,6 +47,31 @@ void IterationWriter::writeShared(Region &from, Block *to, ValueRange like) {
   scf::YieldOp::create(builder, loc, results);
 }
 
+/// Whether lanes come to a region that were elected to.
+static bool isElection(Region &region) {
+  auto choice = dyn_cast<scf::IfOp>(region.getParentOp());
+  auto elect =
+      choice ? choice.getCondition().getDefiningOp<ElectOp>() : ElectOp();
+  return elect && choice.getCondition() == elect.getTakes() &&
+         &region == &choice.getThenRegion();
+}
+
+/// Whether a value that elected lanes have is `kept` in all others, since only
+/// those of them change it that are elected again.
+static bool keepsOthers(Value value, Value kept) {
+  if (value == kept)
+    return true;
+  auto choice = value.getDefiningOp<scf::IfOp>();
+  auto elect =
+      choice ? choice.getCondition().getDefiningOp<ElectOp>() : ElectOp();
+  if (!elect)
+    return false;
+  unsigned number = cast<OpResult>(value).getResultNumber();
+  bool isSide = choice.getCondition() == elect.getSide();
+  return keepsOthers(choice.elseYield().getOperand(number), kept) &&
+         (!isSide || keepsOthers(choice.thenYield().getOperand(number), kept));
+}
+
 SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask,
                                               ValueRange like) {
   Operation *end = region.front().getTerminator();
@@ -57,7 +82,9 @@ SmallVector<Value> IterationWriter::writeSide(Region &region, Value mask,
   };
   Value outer = active;
   active = mask;
-  if (lanes.isCheap(region, /*isNested=*/true)) {
+  // Some lane is always elected.
+  bool isElected = isElection(region);
+  if (isElected || lanes.isCheap(region, /*isNested=*/true)) {
     writeBlock(region.front());
     collect();
     active = outer;
@@ -109,6 +136,28 @@ Value IterationWriter::writeWaiting(Value goesOn) {
   return arith::OrIOp::create(builder, loc, goesOn, splat(wait));
 }
 
+/// By cross-multiplication, so that nothing is divided.
+void IterationWriter::writeElect(ElectOp elect) {
+  constexpr int64_t all = 8;
+  Value first = get(elect.getCondition());
+  Value ofFirst = getBits(both(active, first)),
+        ofSecond = getBits(both(active, invert(first)));
+  Type word = ofFirst.getType();
+  auto weigh = [&](Value bits, int64_t weight) -> Value {
+    Value factor = arith::ConstantOp::create(
+        builder, loc, builder.getIntegerAttr(word, weight));
+    return arith::MulIOp::create(
+        builder, loc, math::CtPopOp::create(builder, loc, bits), factor);
+  };
+  auto eighths = int64_t(elect.getEighths());
+  Value side = arith::CmpIOp::create(
+      builder, loc, arith::CmpIPredicate::ugt, weigh(ofFirst, eighths),
+      weigh(ofSecond, std::max<int64_t>(1, all - eighths)));
+  scalars.map(elect.getSide(), side);
+  vectors.map(elect.getTakes(), getMask(arith::SelectOp::create(
+                                    builder, loc, side, ofFirst, ofSecond)));
+}
+
 void IterationWriter::writeIf(scf::IfOp choice) {
   if (!lanes.isVarying(choice.getCondition())) {
     SmallVector<Type> types;
@@ -138,7 +187,13 @@ void IterationWriter::writeIf(scf::IfOp choice) {
   if (!choice.getElseRegion().empty())
     no = writeSide(choice.getElseRegion(), both(active, invert(condition)),
                    choice.getResults());
+  bool isElected = isElection(choice.getThenRegion());
   for (auto [i, result] : llvm::enumerate(choice.getResults())) {
+    if (isElected && keepsOthers(choice.thenYield().getOperand(i),
+                                 choice.elseYield().getOperand(i))) {
+      setCarried(result, yes[i]);
+      continue;
+    }
     if (lanes.isVarying(result)) {
       vectors.map(result, choose(condition, yes[i], no[i]));
       continue;

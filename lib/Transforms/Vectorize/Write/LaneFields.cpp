@@ -20,6 +20,15 @@ using namespace piko;
 /// often do not.
 static bool mayAgree(scf::ForOp loop) { return !loop->hasAttr(marks::mapping); }
 
+/// Lanes that each go on by themselves have nothing in common.
+static bool isElectedWork(Operation *op, scf::ForOp loop) {
+  for (; op != loop; op = op->getParentOp())
+    if (auto choice = dyn_cast<scf::IfOp>(op);
+        choice && choice.getCondition().getDefiningOp<ElectOp>())
+      return true;
+  return false;
+}
+
 SmallVector<LoadOp> LaneMemory::findFields(Operation *first) const {
   constexpr size_t least = 3;
   auto isPart = [&](LoadOp load) {
@@ -30,7 +39,8 @@ SmallVector<LoadOp> LaneMemory::findFields(Operation *first) const {
            });
   };
   auto load = dyn_cast<LoadOp>(first);
-  if (paired || !mayAgree(loop) || !isPart(load) || isRowOf(load.getIndices()))
+  if (paired || !mayAgree(loop) || !isPart(load) ||
+      isRowOf(load.getIndices()) || isElectedWork(load, loop))
     return {};
   SmallVector<LoadOp> fields;
   for (Operation *op = first; op; op = op->getNextNode()) {

@@ -145,6 +145,16 @@ Value LaneValues::getBits(Value mask) {
                       : arith::ExtUIOp::create(builder, loc, word, packed);
 }
 
+Value LaneValues::getMask(Value word) {
+  Type bits = builder.getIntegerType(laneCount);
+  if (word.getType() != bits)
+    word = arith::TruncIOp::create(builder, loc, bits, word);
+  Value packed = vector::BroadcastOp::create(builder, loc,
+                                             VectorType::get({1}, bits), word);
+  return vector::BitCastOp::create(builder, loc,
+                                   getVectorType(builder.getI1Type()), packed);
+}
+
 //===----------------------------------------------------------------------===//
 // Slots
 //===----------------------------------------------------------------------===//

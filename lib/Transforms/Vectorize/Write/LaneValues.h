@@ -43,6 +43,8 @@ protected:
   /// What has a bit for each lane.
   mlir::Type getWord();
   mlir::Value getBits(mlir::Value mask);
+  /// The mask of the lanes whose bits a word has.
+  mlir::Value getMask(mlir::Value word);
   /// For each lane the value of another.
   mlir::Value permute(mlir::Value value, mlir::Value from);
   /// Vectors with the lanes of others.
