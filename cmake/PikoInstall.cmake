@@ -7,6 +7,7 @@
 #   development    pikort's headers and the dialect's, the CMake package, static
 #                  libraries of the compiler
 #   tools          pikoc, piko-render, ..., and piko.h, which they read
+#   compiler       libpiko, the compiler as a library
 #   documentation  documents and the examples
 #   python         a module for Python, where a target PikoPython is one
 include(CMakePackageConfigHelpers)
@@ -36,7 +37,7 @@ install(FILES README.md CHANGELOG.md SECURITY.md CITATION.cff
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)
 
 if(PIKO_ENABLE_COMPILER)
-  list(APPEND PIKO_COMPONENTS tools)
+  list(APPEND PIKO_COMPONENTS tools compiler)
   set(PIKO_TOOLS pikoc piko-diff piko-render piko-render-library piko-translate piko-tune)
   if(PIKO_ENABLE_GPU)
     list(APPEND PIKO_TOOLS piko-opt)

@@ -53,7 +53,8 @@ function(piko_add_package component name)
     set(${prefix}_SHLIBDEPS ON PARENT_SCOPE)
   endif()
   if(ARG_SHARED)
-    set(control ${PROJECT_BINARY_DIR}/packages-data)
+    set(control ${PROJECT_BINARY_DIR}/packages-data/${component})
+    file(MAKE_DIRECTORY ${control})
     file(WRITE ${control}/triggers "activate-noawait ldconfig\n")
     file(WRITE ${control}/shlibs "${ARG_SHARED} ${name} (>= ${PROJECT_VERSION})\n")
     set(${prefix}_CONTROL_EXTRA ${control}/triggers ${control}/shlibs PARENT_SCOPE)
@@ -106,18 +107,25 @@ include, and tools that render, tune and compare them."
   DEPENDS "${needed}" libclang-common-${llvm}-dev "libstdc++-12-dev | libstdc++-dev"
     libglm-dev
   RECOMMENDS "libpiko-dev (= ${version})")
+piko_add_package(compiler libpiko${PIKO_SOVERSION}
+  SECTION libs SHARED "libpiko ${PIKO_SOVERSION}"
+  SUMMARY "compiler of graphics pipelines as a library"
+  TEXT "${about} the compiler as a shared library with a C interface, for
+applications that compile pipelines while they run."
+  DEPENDS "${needed}" "piko-tools (= ${version})")
 piko_add_package(development libpiko-dev SECTION libdevel
   SUMMARY "headers, CMake package and libraries of Piko"
   TEXT "${about} what applications with compiled pipelines are built
 with, and what passes and tools for Piko's MLIR dialect are: headers, static
 libraries, and a package for CMake. The dialect also needs the packages that
 this one recommends."
-  DEPENDS "${needed}" "piko-tools (= ${version})" libomp-${llvm}-dev
+  DEPENDS "${needed}" "libpiko${PIKO_SOVERSION} (= ${version})" "piko-tools (= ${version})"
+    libomp-${llvm}-dev
   RECOMMENDS libmlir-${llvm}-dev llvm-${llvm}-dev mlir-${llvm}-tools)
 piko_add_package(python python3-piko SECTION python
   SUMMARY "pipelines compiled and run from Python"
   TEXT "${about} the module piko for Python."
-  DEPENDS "piko-tools (= ${version})" python3 python3-numpy)
+  DEPENDS "${needed}" "libpiko${PIKO_SOVERSION} (= ${version})" python3 python3-numpy)
 piko_add_package(documentation piko-doc ALL SECTION doc
   SUMMARY "documentation and examples of Piko"
   TEXT "${about} the documents and the example pipelines.")

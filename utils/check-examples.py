@@ -39,7 +39,7 @@ NAMES = {
     "f32": "u v z depth",
     "i32": "x y x0 y0 x1 y1 one count zero id kind",
     "i64": "batch split mark lineage",
-    "i1": "always isNaN isUnwritten",
+    "i1": "always isInside isNaN isUnwritten",
     "index": "a b bin bucket call cell first hi i j lo n tile unit",
     "vector<16xf32>": "values",
     "vector<16xindex>": "as places",

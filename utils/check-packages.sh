@@ -5,8 +5,8 @@
 #
 # Installs the Debian packages of a folder, as `make packages` leaves them, on a bare
 # Debian 12, and does there what their users do: builds the tutorial's application and
-# the project of docs/OutOfTree.md by the documents' own commands, renders the bunny, reads
-# a manual page, completes a command line, and takes the packages away again. Lintian
+# the project of docs/OutOfTree.md by the documents' own commands, renders the bunny, draws
+# it from Python, reads a manual page, completes a command line, and takes the packages away again. Lintian
 # looks at them, too. As root or through sudo; also `make package-check`.
 #
 #   --folder FOLDER  where its root is made (a new folder of the temporary ones)
@@ -50,7 +50,8 @@ readonly doc=/usr/share/doc/piko
 
 step 'install' "apt-get update -q; $install --allow-downgrades --reinstall ./packages/*.deb"
 step 'every library is found' \
-  'for file in /usr/bin/piko* /usr/lib/libpikort.so.* /usr/lib/piko/modules/*.so; do
+  'for file in /usr/bin/piko* /usr/lib/libpiko*.so.* /usr/lib/piko/modules/*.so \
+       /usr/lib/python3/dist-packages/piko/*.so; do
      ! ldd "$file" | grep "not found"
    done'
 step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev mlir-22-tools \
@@ -72,6 +73,13 @@ step 'the bunny' \
      /usr/share/glmark2/models/bunny.obj --width 1024 --height 768 --out reference.png \
      --target reference --warmup 0 --frames 1
    piko-diff reference.png bunny.png --fail-above 0"
+step 'the bunny from Python, within a minute' \
+  "cp $doc/examples/python/bunny.py .
+   begin=\$(date +%s)
+   python3 bunny.py $doc/examples/raster/raster.piko.cpp /usr/share/glmark2/models/bunny.obj \
+     python.ppm
+   [ \$((\$(date +%s) - begin)) -lt 60 ]
+   head -c 15 python.ppm | grep -aq '^P6'"
 step 'manual pages and completion' \
   "man --warnings -E UTF-8 -l /usr/share/man/man1/pikoc.1.gz 2>&1 >pikoc.txt | (! grep .)
    grep -q -e --header pikoc.txt

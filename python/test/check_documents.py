@@ -57,6 +57,24 @@ class Documents(unittest.TestCase):
         self.assertEqual(len(picture), 15 + 3 * 128 * 128)
         self.assertGreater(len(set(picture)), 100)  # shades
 
+    def test_mesh(self):
+        # A cube, of squares.
+        corners = [f"v {x} {y} {z}" for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
+        faces = ["f 1 3 4 2", "f 5 6 8 7", "f 1 2 6 5", "f 3 7 8 4", "f 1 5 7 3", "f 2 4 8 6"]
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "cube.obj").write_text("\n".join(corners + faces) + "\n")
+            out = self.run_program(ROOT / "examples" / "python" / "bunny.py",
+                                   ROOT / "examples" / "raster" / "raster.piko.cpp",
+                                   "cube.obj", "cube.ppm", folder=folder)
+            picture = (Path(folder) / "cube.ppm").read_bytes()
+        self.assertIn("12 triangles in ", out)
+        pixels = picture[len(b"P6\n1024 768\n255\n"):]
+        self.assertEqual(len(pixels), 3 * 1024 * 768)
+        at = [3 * (1024 * y + x) for x, y in ((512, 384), (5, 5))]
+        middle, corner = (pixels[i:i + 3] for i in at)
+        self.assertEqual(corner, b"\x1a\x1a\x1a")
+        self.assertGreater(min(middle), 0x40)
+
     def test_notebook(self):
         notebook = ROOT / "examples" / "python" / "bubbles.ipynb"
         out = self.run_program(HERE / "run_notebook.py", notebook, folder=HERE)
