@@ -20,6 +20,7 @@
 // CASE: --pipe Seldom --domain 8 8 --count 700
 // CASE: --pipe Seldom --domain 8 8 --count 3
 // CASE: --pipe Each --domain 16 16 --count 5
+// CASE: --pipe Members --domain 16 16 --count 5
 //
 // RUN: %compare_targets %s --stops --pipe Leaves --domain 8 8 --count 60 --runs 1
 //
@@ -66,6 +67,10 @@
 // REDEFINE: %{pipe} = Each
 // RUN: %if all %{ %{merge} %}
 // RUN: %if all %{ %{compare} %}
+//
+// REDEFINE: %{pipe} = Members
+// RUN: %{merge}
+// RUN: %{compare}
 //
 // REDEFINE: %{pipe} = Leaves
 // RUN: %{merge}
@@ -445,6 +450,34 @@ struct Each : piko::Pipe<State> {
   Pixels pixels;
   Each() {
     source(pixels);
+    allocateForSource(state().results, 0);
+    allocateForSource(state().prims, 0);
+  }
+};
+
+/// Members of the list, which are read before the inner loop and after it.
+struct Member : piko::Stage<16, 16, 64, Prim>, piko::Uses<State> {
+  void assignBin(const Prim &p) { assignToAll(p); }
+  void process(const piko::List<Prim> &list) {
+    int count = int(list.size());
+    parallelForPixels([&](glm::ivec2 at) {
+      float sum = 0;
+      for (int i = 0; i < 3; ++i) {
+        const Prim &q =
+            list[int(uint32_t(at.x * 3 + at.y + i) % uint32_t(count))];
+        float x = unit(mix(uint32_t(q.x)));
+        while (x < float(4 + (q.y & 7)))
+          x = x * 1.35f + 0.05f;
+        sum += shade(x, float(q.w & 15));
+      }
+      update(state().picture, at, [&](int &pixel) { pixel = int(sum * 64); });
+    });
+  }
+};
+struct Members : piko::Pipe<State> {
+  Member member;
+  Members() {
+    source(member);
     allocateForSource(state().results, 0);
     allocateForSource(state().prims, 0);
   }

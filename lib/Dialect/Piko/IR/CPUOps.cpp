@@ -49,12 +49,12 @@ LogicalResult TakesVectorsOp::verifySymbolUses(SymbolTableCollection &) {
 }
 
 LogicalResult ElectOp::verify() {
-  constexpr int64_t all = 8;
+  constexpr int64_t most = 7;
   int64_t eighths = getEighths();
-  if (eighths >= 1 && eighths <= all)
+  if (eighths >= 1 && eighths <= most)
     return success();
   return emitOpError("expected from 1 to ")
-         << all << " eighths of the lanes, but got " << eighths;
+         << most << " eighths of the lanes, but got " << eighths;
 }
 
 /// A value and the storage that it is in are of one record.

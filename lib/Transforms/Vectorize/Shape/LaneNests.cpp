@@ -17,8 +17,10 @@
 //
 // A whole nest, of loops beside others and under conditions, is merged into one
 // loop where that is expected to take less still (MergeLoops): what stands
-// around the innermost loop is then done for three eighths of the lanes or
-// more, rather than for whoever is done.
+// around the innermost loop is then done when enough lanes are done with that,
+// rather than for whoever is done. Not merged are loops under an index switch,
+// ranges as the innermost loop, and what holds barriers, arrays of its own, or
+// work whose order shows.
 
 #include "Vectorize/Shape/LaneNests.h"
 
@@ -347,6 +349,7 @@ static void mergeNest(FlatLoop &best, const IterationLanes &lanes,
     loop.erase();
     return;
   }
+  hoistShared(loop, before);
   Location loc = nest.front().loop->getLoc();
   SmallVector<Value> writers;
   std::optional<SmallVector<GetOp>> reads = findReads(loop);
@@ -358,7 +361,6 @@ static void mergeNest(FlatLoop &best, const IterationLanes &lanes,
     Operation *own = *loop.getBody()->getOps<scf::ForOp>().begin();
     nest.insert(nest.begin(), {own, /*iterations=*/1});
   }
-  hoistShared(nest.front().loop, before);
   mergeLoops(nest, loop.getBody());
   if (tryLoop(best, loop, laneCount, loc, gain)) {
     best.writers = writers;

@@ -174,7 +174,7 @@ private:
 } // namespace
 
 LoopPair::Place LoopPair::addPlace(Type type) {
-  if (!arrays || type.isInteger(1)) {
+  if (!arrays || type.isInteger(1) || !type.isIntOrIndexOrFloat()) {
     types.push_back(type);
     return {types.size() - 1};
   }
@@ -185,8 +185,12 @@ LoopPair::Place LoopPair::addPlace(Type type) {
 void LoopPair::findKept() {
   auto add = [&](Value value) {
     Operation *from = value.getDefiningOp();
-    if (value.getParentBlock() == body &&
-        (!from || from->isBeforeInBlock(inner)))
+    if (value.getParentBlock() != body ||
+        (from && !from->isBeforeInBlock(inner)))
+      return;
+    if (from && from->hasTrait<OpTrait::ConstantLike>())
+      from->moveBefore(outer);
+    else
       kept.insert(value);
   };
   for (Operation *op = inner; op; op = op->getNextNode())
@@ -401,7 +405,10 @@ Values LoopPair::writeAtOnce(ValueRange state) {
 }
 
 scf::WhileOp LoopPair::write() {
-  zero = CodeBuilder(builder, loc).index(0);
+  if (arrays) {
+    OpBuilder before(arrays, arrays->begin());
+    zero = CodeBuilder(before, loc).index(0);
+  }
   body->getArgument(0).replaceAllUsesWith(
       CodeBuilder(builder, loc).boolean(true));
   findKept();

@@ -52,7 +52,8 @@ static bool isElection(Region &region) {
   auto choice = dyn_cast<scf::IfOp>(region.getParentOp());
   auto elect =
       choice ? choice.getCondition().getDefiningOp<ElectOp>() : ElectOp();
-  return elect && choice.getCondition() == elect.getTakes() &&
+  return elect && elect->getBlock() == choice->getBlock() &&
+         choice.getCondition() == elect.getTakes() &&
          &region == &choice.getThenRegion();
 }
 
@@ -64,7 +65,8 @@ static bool keepsOthers(Value value, Value kept) {
   auto choice = value.getDefiningOp<scf::IfOp>();
   auto elect =
       choice ? choice.getCondition().getDefiningOp<ElectOp>() : ElectOp();
-  if (!elect)
+  // Only lanes that come to where others are elected are among these.
+  if (!elect || elect->getBlock() != choice->getBlock())
     return false;
   unsigned number = cast<OpResult>(value).getResultNumber();
   bool isSide = choice.getCondition() == elect.getSide();
@@ -150,9 +152,9 @@ void IterationWriter::writeElect(ElectOp elect) {
         builder, loc, math::CtPopOp::create(builder, loc, bits), factor);
   };
   auto eighths = int64_t(elect.getEighths());
-  Value side = arith::CmpIOp::create(
-      builder, loc, arith::CmpIPredicate::ugt, weigh(ofFirst, eighths),
-      weigh(ofSecond, std::max<int64_t>(1, all - eighths)));
+  Value side = arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::ugt,
+                                     weigh(ofFirst, eighths),
+                                     weigh(ofSecond, all - eighths));
   scalars.map(elect.getSide(), side);
   vectors.map(elect.getTakes(), getMask(arith::SelectOp::create(
                                     builder, loc, side, ofFirst, ofSecond)));

@@ -10,7 +10,7 @@ func.func @turn(%c: i1) -> (i1, i1) {
 // -----
 
 func.func @none(%c: i1) -> i1 {
-  // expected-error@+1 {{expected from 1 to 8 eighths of the lanes, but got 0}}
+  // expected-error@+1 {{expected from 1 to 7 eighths of the lanes, but got 0}}
   %side, %takes = piko.cpu.elect %c second 0
   return %side : i1
 }
@@ -18,7 +18,7 @@ func.func @none(%c: i1) -> i1 {
 // -----
 
 func.func @more(%c: i1) -> i1 {
-  // expected-error@+1 {{expected from 1 to 8 eighths of the lanes, but got 9}}
-  %side, %takes = piko.cpu.elect %c second 9
+  // expected-error@+1 {{expected from 1 to 7 eighths of the lanes, but got 8}}
+  %side, %takes = piko.cpu.elect %c second 8
   return %side : i1
 }

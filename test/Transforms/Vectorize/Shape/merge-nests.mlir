@@ -9,6 +9,7 @@ piko.record @N {"n" : i32 at 0} size 4 align 4
 // each turn of which lanes make an iteration of the innermost one, or all else.
 // CHECK-LABEL: piko.pipeline @Nest
 // CHECK:         scf.for
+// CHECK-NOT:       memref<1xindex>
 // CHECK:           scf.while
 // CHECK:             %[[SIDE:.*]], %[[TAKES:.*]] = piko.cpu.elect %{{.*}} second 3
 // CHECK:             scf.if %[[SIDE]]
