@@ -14,6 +14,8 @@
 #                    card, by estimates (GPU_BENCH=--quick; docs/GPU.md)
 # And for a machine with a card that has nothing else:
 #   make gpu-kit     packs BUILD/gpu-kit.tar.zst, which takes ten minutes
+# All documents and an API reference as a static site, which needs no build:
+#   make site     in half a minute; says where the start page is
 # For who gives Piko to others:
 #   make packages        Debian packages, in a minute
 #   make package-check   installs and uses them on a bare Debian 12
@@ -33,7 +35,7 @@ PIPE ?= Fused
 
 .DELETE_ON_ERROR:
 .PHONY: abi all bench bench-gate build charts check check-all clean configure demo deps \
-  docs format gpu-bench gpu-kit lanes lint package-check packages
+  docs format gpu-bench gpu-kit lanes lint package-check packages site
 
 all: build
 
@@ -96,6 +98,11 @@ charts: configure
 	  --target piko-render piko-diff FailureTests
 	@/usr/bin/python3 benchmarks/speed-error.py --bin $(BUILD)/bin \
 	  --out $(BUILD)/charts $(CHARTS)
+
+# All documents, and Doxygen's reference of the headers; checks all links.
+site:
+	@utils/install-deps.sh utils/packages-site.txt
+	@utils/site/make.py --out $(BUILD)/site
 
 # The Python module for pip, in build/wheel.
 .PHONY: wheel

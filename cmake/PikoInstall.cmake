@@ -27,7 +27,8 @@ install(DIRECTORY runtime/include/pikort DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
 install(FILES runtime/include/piko.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT tools)
 install(DIRECTORY runtime/include/piko DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   COMPONENT tools)
-install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation
+  PATTERN site EXCLUDE)
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation
   REGEX "examples/[a-z]+/CMakeLists.txt$" EXCLUDE
   REGEX "examples/CMakeLists.txt$" EXCLUDE)

@@ -39,7 +39,7 @@ split-file. Substitutions:
 
 PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
 that is so, `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
-is, `ptxas` where NVIDIA's assembler is, `chromium` where that browser is, `asan` and `tsan` in
+is, `ptxas` where NVIDIA's assembler is, `chromium` and `doxygen` where these are, `asan` and `tsan` in
 builds with that sanitizer, `fork-server` where tools fork.
 """
 
@@ -202,6 +202,8 @@ if shutil.which("ptxas", path=config.environment["PATH"]):
     config.available_features.add("ptxas")
 if shutil.which("chromium"):
     config.available_features.add("chromium")
+if shutil.which("doxygen"):
+    config.available_features.add("doxygen")
 if "address" in config.sanitize:
     config.available_features.add("asan")
 if "thread" in config.sanitize:
