@@ -73,12 +73,10 @@ step 'the bunny' \
      /usr/share/glmark2/models/bunny.obj --width 1024 --height 768 --out reference.png \
      --target reference --warmup 0 --frames 1
    piko-diff reference.png bunny.png --fail-above 0"
-step 'the bunny from Python, within a minute' \
+step 'the bunny from Python' \
   "cp $doc/examples/python/bunny.py .
-   begin=\$(date +%s)
-   python3 bunny.py $doc/examples/raster/raster.piko.cpp /usr/share/glmark2/models/bunny.obj \
+   time python3 bunny.py $doc/examples/raster/raster.piko.cpp /usr/share/glmark2/models/bunny.obj \
      python.ppm
-   [ \$((\$(date +%s) - begin)) -lt 60 ]
    head -c 15 python.ppm | grep -aq '^P6'"
 step 'manual pages and completion' \
   "man --warnings -E UTF-8 -l /usr/share/man/man1/pikoc.1.gz 2>&1 >pikoc.txt | (! grep .)

@@ -13,6 +13,8 @@
 
 #include "Vectorize/Shape/FlattenLoops.h"
 
+#include "Vectorize/Shape/RotateLoops.h"
+
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
@@ -42,21 +44,6 @@ static bool isSimple(Operation *loop) {
   auto counted = dyn_cast<scf::ForOp>(loop);
   return !counted ||
          (!counted.getUnsignedCmp() && getConstantIntValue(counted.getStep()));
-}
-
-/// The type that a loop counts in: 32 bits, where its bounds have no more.
-static Type getCounterType(scf::ForOp loop) {
-  auto isWord = [](Value bound) {
-    std::optional<int64_t> known = getConstantIntValue(bound);
-    auto cast = bound.getDefiningOp<arith::IndexCastOp>();
-    return known ? llvm::isInt<32>(*known)
-                 : cast && cast.getIn().getType().isInteger(32);
-  };
-  Type type = loop.getInductionVar().getType();
-  return type.isIndex() && isWord(loop.getLowerBound()) &&
-                 isWord(loop.getUpperBound())
-             ? IntegerType::get(loop.getContext(), 32)
-             : type;
 }
 
 /// What a bound is cast from, where a loop counts in fewer bits.

@@ -456,7 +456,8 @@ static SmallVector<NestedLoop> flattenShort(ArrayRef<NestedLoop> loops) {
 
 /// In how many turns lanes are in each loop of a nest, but in the one inside.
 static SmallVector<double> estimateTurns(ArrayRef<NestedLoop> nest) {
-  // Of the lanes in a turn, by counts of rays, walks and marches.
+  // Of the lanes in a turn: three eighths, or a few more, in a step that waits
+  // for these, and from five eighths to all in the others.
   constexpr double ofInner = 0.75, ofSteps = 0.45;
   SmallVector<double> turns;
   double around = 1;

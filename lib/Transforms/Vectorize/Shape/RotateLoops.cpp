@@ -33,8 +33,7 @@ void piko::moveBody(Block &from, OpBuilder &builder) {
                                              std::prev(from.end()));
 }
 
-/// The type that a loop counts in: 32 bits, where its bounds have no more.
-static Type getCounterType(scf::ForOp loop) {
+Type piko::getCounterType(scf::ForOp loop) {
   auto isWord = [](Value bound) {
     std::optional<int64_t> known = getConstantIntValue(bound);
     auto cast = bound.getDefiningOp<arith::IndexCastOp>();
@@ -43,7 +42,7 @@ static Type getCounterType(scf::ForOp loop) {
   };
   Type type = loop.getInductionVar().getType();
   return type.isIndex() && isWord(loop.getLowerBound()) &&
-                 isWord(loop.getUpperBound()) && isOneInteger(loop.getStep())
+                 isWord(loop.getUpperBound())
              ? IntegerType::get(loop.getContext(), 32)
              : type;
 }
@@ -61,8 +60,11 @@ scf::WhileOp piko::createFlagged(OpBuilder &builder, Location loc,
   return made;
 }
 
+/// A bound in the type that a rotated loop counts in, whose number after the
+/// last must not wrap around.
 static Value getBound(OpBuilder &builder, scf::ForOp loop, Value bound) {
-  Type type = getCounterType(loop);
+  Type type = isOneInteger(loop.getStep()) ? getCounterType(loop)
+                                           : loop.getInductionVar().getType();
   if (type == bound.getType())
     return bound;
   if (std::optional<int64_t> known = getConstantIntValue(bound))

@@ -20,6 +20,9 @@ mlir::scf::WhileOp createFlagged(mlir::OpBuilder &builder, mlir::Location loc,
 /// order. Operations of its body stay the same ones.
 mlir::scf::WhileOp rotate(mlir::Operation *loop);
 
+/// The type that a loop counts in: 32 bits, where its bounds have no more.
+mlir::Type getCounterType(mlir::scf::ForOp loop);
+
 mlir::Value createPoison(mlir::OpBuilder &builder, mlir::Location loc,
                          mlir::Type type);
 llvm::SmallVector<mlir::Value> createPoison(mlir::OpBuilder &builder,

@@ -276,7 +276,7 @@ def Piko_TakesVectorsOp : Piko_CPUOp<"takes_vectors", [
   let assemblyFormat = "$writer attr-dict";
 }
 
-def Piko_ElectOp : Piko_CPUOp<"elect", [Pure]> {
+def Piko_ElectOp : Piko_CPUOp<"elect", [NoMemoryEffect]> {
   let summary = "which side of a condition the lanes of a vector take in a turn";
   let description = [{
     Iteration delaying, for loops that were merged into one. Of the lanes that are at
@@ -284,7 +284,8 @@ def Piko_ElectOp : Piko_CPUOp<"elect", [Pure]> {
     first one is taken, and is the same for all lanes: the second one is taken from
     so many `eighths` of these lanes on, or if there are no others. `takes` is
     whether a lane is on the side that is taken; others wait for a turn of theirs.
-    Where there are no lanes, an iteration is always on the side that is taken.
+    Where there are no lanes, an iteration is always on the side that is taken. It
+    depends on who is at work where it stands: nothing moves it.
 
     ```mlir
     %side, %takes = piko.cpu.elect %isInside second 3
