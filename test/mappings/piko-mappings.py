@@ -36,7 +36,7 @@ STRIPS = [None, 100]
 PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prune",
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-strips",
           "form-gbuffer", "defer-shading", "form-tiles", "prefetch", "vectorize",
-          "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds",
+          "prove-bounds", "hoist-loads", "hoist-bounds", "merge-bounds", "combine-bounds",
           "thread-jumps", "narrow-integers", "distribute-loops", "reduce-strength", "peel-vectors",
           "merge-gathers", "pair-gathers",
           "unswitch-versions", "privatize", "reduce-updates", "if-convert"]

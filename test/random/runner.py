@@ -21,7 +21,7 @@ PASSES = ["pre-schedule", "infer-directives", "fuse-stages", "test-early", "prun
           "own-pixels", "eliminate-schedules", "fuse-kernels", "form-gbuffer",
           "defer-shading", "form-tiles", "prefetch", "vectorize", "prove-bounds",
           "lockstep", "flatten-nests", "merge-nests", "compact-loops",
-          "hoist-loads", "hoist-bounds", "merge-bounds", "thread-jumps",
+          "hoist-loads", "hoist-bounds", "merge-bounds", "combine-bounds", "thread-jumps",
           "narrow-integers", "merge-gathers", "pair-gathers", "if-convert",
           "unswitch-versions",
           "uplift-pixel-loops", "privatize", "reduce-updates",

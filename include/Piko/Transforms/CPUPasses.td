@@ -214,6 +214,53 @@ def MergeBounds : Pass<"piko-merge-bounds", "::piko::PipelineOp"> {
   }];
 }
 
+def CombineBounds : Pass<"piko-combine-bounds", "::piko::PipelineOp"> {
+  let summary = "Test independent indices at once";
+  let description = [{
+    **Requires** access to state that is tested (`convert-piko-to-scf`), once for an
+    element (`piko-merge-bounds`).
+
+    **Does**: tests of a block that need nothing of each other's elements become one: a
+    condition that all hold guards the reads of all; where it does not hold, each has
+    its own test. So look-ups in tables have a branch for each level, and lanes one
+    mask. Sizes that one index is compared with become their minimum, which is the same
+    for a whole loop.
+
+    **Guarantees** the same numbers and the same errors: nothing that may change what a
+    test reads stands between it and the first.
+
+    Before:
+    ```
+    %x = scf.if %i_inside -> (i32) {
+      %1 = piko.load checked @table[%i : i32] "value" : i32
+      scf.yield %1 : i32
+    } else { ... }
+    %y = scf.if %j_inside -> (i32) {
+      %2 = piko.load checked @table[%j : i32] "value" : i32
+      scf.yield %2 : i32
+    } else { ... }
+    ```
+    After:
+    ```
+    %all = arith.andi %i_inside, %j_inside : i1
+    %xy:2 = scf.if %all -> (i32, i32) {
+      %1 = piko.load checked @table[%i : i32] "value" : i32
+      %2 = piko.load checked @table[%j : i32] "value" : i32
+      scf.yield %1, %2 : i32, i32
+    } else {
+      // as before
+    }
+    ```
+
+    **Limits**: indices must vary with the same loops, so that what lanes share stays
+    scalar. No read passes a loop or a condition that is no test.
+  }];
+  let options = [
+    Option<"maxTests", "max-tests", "size_t", "8",
+           "How many tests become one">];
+  let dependentDialects = ["::mlir::arith::ArithDialect", "::mlir::scf::SCFDialect"];
+}
+
 def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {
   let summary = "Put work under the conditions that need it";
   let description = [{

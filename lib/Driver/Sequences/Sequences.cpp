@@ -155,6 +155,10 @@ void piko::addUnitsToLoops(OpPassManager &passes,
     passes.nest<PipelineOp>().addPass(createMergeBounds());
     addCleanUp(passes);
   }
+  if (options.has("combine-bounds")) {
+    passes.nest<PipelineOp>().addPass(createCombineBounds());
+    addCleanUp(passes);
+  }
   if (options.has("thread-jumps")) {
     passes.nest<PipelineOp>().addPass(createThreadJumps());
     addCleanUp(passes);

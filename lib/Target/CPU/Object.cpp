@@ -8,6 +8,7 @@
 #include "Passes/CompressStores.h"
 #include "Passes/LowerArithmetic.h"
 #include "Passes/LowerPermutations.h"
+#include "Passes/PreserveRegisters.h"
 #include "Passes/SelectBits.h"
 #include "Passes/SplitRows.h"
 #include "Passes/StoreLanes.h"
@@ -101,6 +102,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
     passes.addPass(createModuleToFunctionPassAdaptor(StoreLanesPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(BroadcastLoadsPass(machine)));
+    if (sanitizer == Sanitizer::None)
+      passes.addPass(PreserveRegistersPass(machine));
   }
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));

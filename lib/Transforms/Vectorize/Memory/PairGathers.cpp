@@ -288,7 +288,11 @@ static SmallVector<Value> createReads(CodeBuilder at, const Run &run) {
       values.push_back(builder.clone(*read.gather)->getResult(0));
     scf::YieldOp::create(builder, loc, values);
   };
+  // Where all are read, all are here.
+  bool areSide = masks.size() == 1 && run.distance == Distance::Next;
   auto read = [&](OpBuilder &builder, Location loc) {
+    if (areSide)
+      return readRun(builder, loc);
     auto choice = scf::IfOp::create(builder, loc,
                                     createAreApart({builder, loc}, run, some),
                                     readApart, readRun);

@@ -124,6 +124,13 @@ Value IterationWriter::divideAsFloats(Operation *division, Value dividend,
   return arith::FPToUIOp::create(builder, loc, dividend.getType(), quotient);
 }
 
+/// An extent, or the least of several.
+static bool isExtent(Value value) {
+  if (auto least = value.getDefiningOp<arith::MinUIOp>())
+    return isExtent(least.getLhs()) && isExtent(least.getRhs());
+  return value.getDefiningOp<ExtentOp>() != nullptr;
+}
+
 /// Whether an index is inside of an extent, by its 32 bits: vectors of 64 bits
 /// are two, and take as long again to bring together.
 bool IterationWriter::writeInside(arith::CmpIOp compare) {
@@ -131,7 +138,7 @@ bool IterationWriter::writeInside(arith::CmpIOp compare) {
   Value extent = compare.getRhs();
   if (compare.getPredicate() != arith::CmpIPredicate::ult || !index ||
       !index.getIn().getType().isInteger(32) || lanes.isVarying(extent) ||
-      !lanes.isVarying(index.getIn()) || !extent.getDefiningOp<ExtentOp>())
+      !lanes.isVarying(index.getIn()) || !isExtent(extent))
     return false;
   // A negative index is, without its sign, this much or more.
   constexpr int64_t most = int64_t(1) << 31;
