@@ -29,6 +29,8 @@ private:
   void addCalls(const StageWork &stage);
   void addTurns(const LoopWork &loop);
   void addKernel(const KernelWork &kernel);
+  void addLanes(const CodeWork &code, double milliseconds,
+                const std::string &where);
   void addTimes();
   void addStored();
   void add(double milliseconds, std::string what, std::string advice) {
@@ -113,22 +115,36 @@ void WasteFinder::addTurns(const LoopWork &loop) {
           "a tighter range of the loop, or smaller bins, which end it");
 }
 
+/// Of code whose vectors take so long.
+void WasteFinder::addLanes(const CodeWork &code, double milliseconds,
+                           const std::string &where) {
+  if (code.lanes == 0)
+    return;
+  double active = double(code.active), vectors = double(code.vectors);
+  add(milliseconds * (1 - active / double(code.lanes)),
+      text(active / vectors) + " of " + text(double(code.lanes) / vectors) +
+          " lanes are at work " + where,
+      "specifyLanes(Items) where each primitive has few iterations, "
+      "specifyLanes(Iterations) where it has many; larger bins; or primitives "
+      "in an order in which neighbours do alike");
+}
+
 void WasteFinder::addKernel(const KernelWork &kernel) {
-  double instructions = double(kernel.scalars + kernel.vectors);
+  double instructions = double(kernel.all.scalars + kernel.all.vectors);
   if (instructions == 0)
     return;
   double time = timeOfKernel(kernel.name);
-  if (kernel.lanes > 0)
-    add(time * double(kernel.vectors) / instructions *
-            (1 - double(kernel.active) / double(kernel.lanes)),
-        "of the lanes of " + kernel.name + "'s vectors " +
-            text(100 * double(kernel.active) / double(kernel.lanes)) +
-            " % do something",
-        "specifyLanes(Items) where each primitive has few iterations, "
-        "specifyLanes(Iterations) where it has many; or larger bins");
+  auto timeOf = [&](int64_t count) {
+    return time * double(count) / instructions;
+  };
+  addLanes(kernel.outside, timeOf(kernel.outside.vectors),
+           "in " + kernel.name + ", outside of loops");
+  for (const auto &[place, code] : kernel.loops)
+    addLanes(code, timeOf(code.vectors),
+             "in the loop of " + kernel.name + " at " + place);
   // What vectors of eight lanes would leave of it.
-  add(time * double(kernel.scalars) / instructions * 7 / 8,
-      text(100 * double(kernel.scalars) / instructions) + " % of what " +
+  add(timeOf(kernel.all.scalars) * 7 / 8,
+      text(100 * double(kernel.all.scalars) / instructions) + " % of what " +
           kernel.name + " executes is scalar",
       "see why by pikoc --remarks: loops without order become vectors");
 }

@@ -53,8 +53,7 @@ template <class T> static T &find(std::vector<T> &all, const char *name) {
   return all.back();
 }
 
-void Collector::addCode(const pikort_counter &counter) {
-  KernelWork &to = find(work.kernels, counter.stage);
+static void add(CodeWork &to, const pikort_counter &counter) {
   switch (counter.kind) {
   case PIKORT_SCALARS:
     to.scalars += counter.count;
@@ -68,6 +67,13 @@ void Collector::addCode(const pikort_counter &counter) {
   default:
     to.active += counter.count;
   }
+}
+
+void Collector::addCode(const pikort_counter &counter) {
+  KernelWork &kernel = find(work.kernels, counter.stage);
+  ::add(kernel.all, counter);
+  bool isLoop = counter.around >= 0 && counter.place;
+  ::add(isLoop ? kernel.loops[counter.place] : kernel.outside, counter);
 }
 
 int64_t Collector::countOf(int32_t index) {

@@ -13,6 +13,8 @@
 
 #include "Piko/Scene/Json.h"
 
+#include <map>
+
 namespace piko::render {
 
 /// What the text of a stage does.
@@ -53,10 +55,18 @@ struct LoopWork {
   int64_t effects = 0;
 };
 
+/// What code does: operations on scalars and on vectors, the lanes of these,
+/// and how many of them are at work.
+struct CodeWork {
+  int64_t scalars = 0, vectors = 0, lanes = 0, active = 0;
+};
+
 /// What the code of a kernel does.
 struct KernelWork {
   std::string name;
-  int64_t scalars = 0, vectors = 0, lanes = 0, active = 0;
+  CodeWork all;
+  CodeWork outside;                      ///< Of loops.
+  std::map<std::string, CodeWork> loops; ///< Without those inside, by place.
 };
 
 struct Work {

@@ -74,14 +74,24 @@ static Json reportLoop(const LoopWork &loop) {
                        {"effects", loop.effects}});
 }
 
-static Json reportKernel(const KernelWork &kernel) {
+static Json reportCode(const CodeWork &code) {
   return Json::object(
-      {{"name", kernel.name},
-       {"scalars", kernel.scalars},
-       {"vectors", kernel.vectors},
-       {"lanes", kernel.lanes},
-       {"active_lanes", kernel.active},
-       {"ratio", roundToThousandths(ratio(kernel.lanes, kernel.active))}});
+      {{"scalars", code.scalars},
+       {"vectors", code.vectors},
+       {"lanes", code.lanes},
+       {"active_lanes", code.active},
+       {"ratio", roundToThousandths(ratio(code.lanes, code.active))}});
+}
+
+static Json reportKernel(const KernelWork &kernel) {
+  Json report = reportCode(kernel.all), loops = Json::array();
+  report["name"] = kernel.name;
+  for (const auto &[place, code] : kernel.loops) {
+    loops.push_back(reportCode(code));
+    loops.back()["place"] = place;
+  }
+  report["loops"] = loops;
+  return report;
 }
 
 template <class T>
@@ -190,9 +200,26 @@ static void printKernels(std::string &text, const Work &work) {
         "lanes", "used", "ratio");
   for (const KernelWork &kernel : work.kernels)
     print(text, "  %-22s %10s %10s %10s %10s %7.2f", kernel.name.c_str(),
-          shorten(kernel.scalars).c_str(), shorten(kernel.vectors).c_str(),
-          shorten(kernel.lanes).c_str(), shorten(kernel.active).c_str(),
-          ratio(kernel.lanes, kernel.active));
+          shorten(kernel.all.scalars).c_str(),
+          shorten(kernel.all.vectors).c_str(),
+          shorten(kernel.all.lanes).c_str(), shorten(kernel.all.active).c_str(),
+          ratio(kernel.all.lanes, kernel.all.active));
+}
+
+/// Lanes at work in each loop that has vectors of its own.
+static void printLanes(std::string &text, const Work &work) {
+  bool isFirst = true;
+  for (const KernelWork &kernel : work.kernels)
+    for (const auto &[place, code] : kernel.loops) {
+      if (!code.vectors)
+        continue;
+      if (std::exchange(isFirst, false))
+        print(text, "  %-22s %10s %10s %7s  %s", "lanes in loops of", "vectors",
+              "at work", "of", "at");
+      print(text, "  %-22s %10s %10.1f %7.3g  %s", kernel.name.c_str(),
+            shorten(code.vectors).c_str(), ratio(code.active, code.vectors),
+            ratio(code.lanes, code.vectors), place.c_str());
+    }
 }
 
 std::string render::printWork(const Work &work, int64_t pixels) {
@@ -202,5 +229,6 @@ std::string render::printWork(const Work &work, int64_t pixels) {
   printEdges(text, work);
   printAccesses(text, work);
   printKernels(text, work);
+  printLanes(text, work);
   return text;
 }

@@ -104,8 +104,9 @@ def CountLanes : Pass<"piko-count-lanes", "::piko::PipelineOp"> {
     **Does**: counts, in each kernel, the arithmetic operations on scalars, those on
     vectors, the lanes of these, and the lanes that are active. A lane is active if it
     is set in the mask that an `scf.if` or an `scf.while` around the block tests for
-    any, or else in the mask of the block's first masked access. A unit of work adds up
-    in memory of its own, and tells the runtime (`piko.count`) at its end.
+    any, or else in the mask of the block's first masked access. What stands in a loop
+    is counted for the loop's line, `inside` of the kernel's first counter. A unit of
+    work adds up in memory of its own, and tells the runtime (`piko.count`) at its end.
 
     **Guarantees** that the pipeline computes what it did, by the same vectors.
 

@@ -20,6 +20,7 @@
 #include "mlir/Dialect/MemRef/IR/MemRef.h"
 #include "mlir/Dialect/SCF/IR/SCF.h"
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
+#include "llvm/Support/SaveAndRestore.h"
 
 namespace piko {
 #define GEN_PASS_DEF_COUNTLANES
@@ -44,29 +45,39 @@ struct BlockWork {
   int64_t scalars = 0, vectors = 0, lanes = 0;
 };
 
-/// Counts in one kernel.
+/// Counts in one kernel. What stands in a loop whose line is known is counted
+/// for that line, other things for what is around them.
 class LaneCounter {
 public:
-  LaneCounter(KernelOp kernel, int32_t firstCounter)
-      : kernel(kernel), firstCounter(firstCounter),
+  LaneCounter(KernelOp kernel, Counters &counters, StringAttr stage)
+      : kernel(kernel), counters(counters), stage(stage),
         builder(kernel.getContext()) {}
   void run();
 
 private:
+  void addCounters(Location loc, std::optional<int32_t> around);
+  void findLoops();
   /// `sums` are those of the unit, `mask` of the lanes that do something, or
   /// null where all do.
   void countBlock(Block &block, Value sums, Value mask);
   void countRegions(Operation &op, Value sums, Value mask);
   void countUnit(Block &block);
   void addWork(Block &block, const BlockWork &work, Value sums, Value mask);
-  void add(Value sums, int64_t which, Value amount);
+  void add(Value sums, CounterKind kind, Value amount);
+  int64_t getCounterCount() const {
+    return kindCount * static_cast<int64_t>(firstCounters.size());
+  }
   Value constant(int64_t value) {
     return arith::ConstantIndexOp::create(builder, kernel.getLoc(), value);
   }
 
   KernelOp kernel;
-  int32_t firstCounter;
+  Counters &counters;
+  StringAttr stage;
   OpBuilder builder;
+  SmallVector<int32_t> firstCounters;         ///< The kernel's, those of lines.
+  llvm::DenseMap<Operation *, int64_t> lines; ///< Of loops.
+  int64_t line = 0;                           ///< Where blocks are counted.
 };
 
 } // namespace
@@ -136,9 +147,9 @@ static Value getAccessMask(Block &block) {
   return {};
 }
 
-void LaneCounter::add(Value sums, int64_t which, Value amount) {
+void LaneCounter::add(Value sums, CounterKind kind, Value amount) {
   Location loc = kernel.getLoc();
-  Value at = constant(which);
+  Value at = constant(line * kindCount + (llvm::find(kinds, kind) - kinds));
   Value before = memref::LoadOp::create(builder, loc, sums, at);
   Value after = arith::AddIOp::create(builder, loc, before, amount);
   memref::StoreOp::create(builder, loc, after, sums, at);
@@ -161,23 +172,26 @@ void LaneCounter::addWork(Block &block, const BlockWork &work, Value sums,
   // At the end: there the block's own mask is known.
   builder.setInsertionPoint(block.getTerminator());
   if (work.scalars)
-    add(sums, 0, constant(work.scalars));
+    add(sums, CounterKind::Scalars, constant(work.scalars));
   if (!work.vectors)
     return;
-  add(sums, 1, constant(work.vectors));
-  add(sums, 2, constant(work.lanes));
+  add(sums, CounterKind::Vectors, constant(work.vectors));
+  add(sums, CounterKind::Lanes, constant(work.lanes));
   if (!mask) {
-    add(sums, 3, constant(work.lanes));
+    add(sums, CounterKind::ActiveLanes, constant(work.lanes));
     return;
   }
   Location loc = kernel.getLoc();
   int64_t width = cast<VectorType>(mask.getType()).getNumElements();
   Value active = arith::MulIOp::create(
       builder, loc, countLanes(builder, loc, mask), constant(work.lanes));
-  add(sums, 3, arith::DivUIOp::create(builder, loc, active, constant(width)));
+  add(sums, CounterKind::ActiveLanes,
+      arith::DivUIOp::create(builder, loc, active, constant(width)));
 }
 
 void LaneCounter::countRegions(Operation &op, Value sums, Value mask) {
+  auto known = lines.find(&op);
+  llvm::SaveAndRestore inner(line, known == lines.end() ? line : known->second);
   if (isa<scf::ForallOp>(op)) {
     countUnit(op.getRegion(0).front());
     return;
@@ -187,14 +201,14 @@ void LaneCounter::countRegions(Operation &op, Value sums, Value mask) {
     countBlock(*loop.getAfterBody(), sums, getBodyMask(loop, mask));
     return;
   }
-  Value inner = mask;
+  Value own = mask;
   if (auto branch = dyn_cast<scf::IfOp>(op))
     if (Value asked = getMask(branch.getCondition()))
-      inner = asked;
+      own = asked;
   for (Region &region : op.getRegions())
     for (Block &block : region) {
-      countBlock(block, sums, inner);
-      inner = mask; // of the other branch
+      countBlock(block, sums, own);
+      own = mask; // of the other branch
     }
 }
 
@@ -215,18 +229,47 @@ void LaneCounter::countUnit(Block &block) {
   Location loc = kernel.getLoc();
   builder.setInsertionPointToStart(&block);
   Value sums = memref::AllocaOp::create(
-      builder, loc, MemRefType::get({kindCount}, builder.getIndexType()));
-  for (int64_t which = 0; which < kindCount; ++which)
+      builder, loc,
+      MemRefType::get({getCounterCount()}, builder.getIndexType()));
+  for (int64_t which = 0; which < getCounterCount(); ++which)
     memref::StoreOp::create(builder, loc, constant(0), sums, constant(which));
   countBlock(block, sums, Value());
   builder.setInsertionPoint(block.getTerminator());
-  for (int64_t which = 0; which < kindCount; ++which) {
+  for (int64_t which = 0; which < getCounterCount(); ++which) {
     Value sum = memref::LoadOp::create(builder, loc, sums, constant(which));
-    CountOp::create(builder, loc, firstCounter + which, sum);
+    CountOp::create(builder, loc,
+                    firstCounters[which / kindCount] +
+                        static_cast<int32_t>(which % kindCount),
+                    sum);
   }
 }
 
-void LaneCounter::run() { countUnit(*kernel.getBodyBlock()); }
+void LaneCounter::addCounters(Location loc, std::optional<int32_t> around) {
+  firstCounters.push_back(counters.size());
+  for (CounterKind kind : kinds)
+    counters.add(loc, kind, stage, around);
+}
+
+/// Copies of a loop have one line.
+void LaneCounter::findLoops() {
+  llvm::DenseMap<std::pair<Attribute, unsigned>, int64_t> known;
+  kernel.walk<WalkOrder::PreOrder>([&](Operation *op) {
+    auto at = op->getLoc()->findInstanceOf<FileLineColLoc>();
+    if (!isa<scf::ForOp, scf::WhileOp>(op) || !at)
+      return;
+    auto [place, isNew] = known.try_emplace({at.getFilename(), at.getLine()},
+                                            firstCounters.size());
+    if (isNew)
+      addCounters(at, firstCounters.front());
+    lines[op] = place->second;
+  });
+}
+
+void LaneCounter::run() {
+  addCounters(kernel.getLoc(), std::nullopt);
+  findLoops();
+  countUnit(*kernel.getBodyBlock());
+}
 
 /// The name of the stage whose work a kernel does, or null.
 static StringAttr getStage(KernelOp kernel) {
@@ -246,9 +289,6 @@ void CountLanesPass::runOnOperation() {
     StringAttr stage = getStage(kernel);
     if (!stage)
       continue;
-    int32_t first = counters.size();
-    for (CounterKind kind : kinds)
-      counters.add(kernel.getLoc(), kind, stage);
-    LaneCounter(kernel, first).run();
+    LaneCounter(kernel, counters, stage).run();
   }
 }

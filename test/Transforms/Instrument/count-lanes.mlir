@@ -49,3 +49,54 @@ piko.pipeline @Lanes rank 1 {
     piko.storage.close_bins %bins : !piko.bins<@V>
   }
 }
+
+// What stands in a loop is counted for its line, which two copies share; a loop
+// of which no line is known belongs to what is around it.
+// CHECK-LABEL: piko.pipeline @Lines
+// CHECK-NEXT: piko.counter 0 scalars of "a"{{$}}
+// CHECK:      piko.counter 4 scalars of "a" inside 0
+// CHECK-NEXT: piko.counter 5 vectors of "a" inside 0
+// CHECK-NEXT: piko.counter 6 lanes of "a" inside 0
+// CHECK-NEXT: piko.counter 7 active_lanes of "a" inside 0
+// CHECK-NOT:  piko.counter 8
+piko.pipeline @Lines rank 1 {
+  piko.source @a
+  piko.stage @a bins [0] threads 1 : @V -> [] {}
+
+  // CHECK: scf.forall
+  // CHECK-NEXT: %[[SUMS:.*]] = memref.alloca() : memref<8xindex>
+  // CHECK: scf.for
+  // CHECK: arith.addf {{.*}} : vector<16xf32>
+  // CHECK: %[[VECTORS:.*]] = arith.constant 5 : index
+  // CHECK-NEXT: memref.load %[[SUMS]][%[[VECTORS]]]
+  // CHECK: scf.for
+  // CHECK: arith.mulf {{.*}} : vector<16xf32>
+  // CHECK: %[[SAME:.*]] = arith.constant 5 : index
+  // CHECK-NEXT: memref.load %[[SUMS]][%[[SAME]]]
+  // CHECK: scf.for
+  // CHECK: arith.subf {{.*}} : vector<16xf32>
+  // CHECK: arith.constant 1 : index
+  // CHECK-NEXT: %[[OUTSIDE:.*]] = arith.constant 1 : index
+  // CHECK-NEXT: memref.load %[[SUMS]][%[[OUTSIDE]]]
+  // CHECK: piko.count 7 by
+  piko.kernel @k {
+    %x = arith.constant dense<1.0> : vector<16xf32>
+    %c0 = arith.constant 0 : index
+    %c1 = arith.constant 1 : index
+    %c9 = arith.constant 9 : index
+    %bins = piko.storage.open_bins @a : !piko.bins<@V>
+    %units = piko.storage.unit_count %bins : !piko.bins<@V>
+    scf.forall (%u) in (%units) {
+      scf.for %i = %c0 to %c9 step %c1 {
+        %y = arith.addf %x, %x : vector<16xf32>
+      } loc("a.cpp":3:5)
+      scf.for %i = %c0 to %c9 step %c1 {
+        %y = arith.mulf %x, %x : vector<16xf32>
+      } loc("a.cpp":3:9)
+      scf.for %i = %c0 to %c9 step %c1 {
+        %y = arith.subf %x, %x : vector<16xf32>
+      } loc(unknown)
+    }
+    piko.storage.close_bins %bins : !piko.bins<@V>
+  }
+}
