@@ -275,6 +275,8 @@ bool Uniformity::visit(Operation *op) {
     bool changed = mark(elect.getSide(), std::min(level, Uniform::Item));
     return mark(elect.getTakes(), level) || changed;
   }
+  if (isa<VoteOp>(op))
+    return false;        // one result for all lanes, whatever they are given
   if (isa<ReduceOp>(op)) // one result for all iterations
     level = Uniform::Item;
   else if (load ? written.contains(load.getStateAttr())

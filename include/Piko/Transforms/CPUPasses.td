@@ -221,10 +221,11 @@ def CombineBounds : Pass<"piko-combine-bounds", "::piko::PipelineOp"> {
     element (`piko-merge-bounds`).
 
     **Does**: tests of a block that need nothing of each other's elements become one: a
-    condition that all hold guards the reads of all; where it does not hold, each has
-    its own test. So look-ups in tables have a branch for each level, and lanes one
-    mask. Sizes that one index is compared with become their minimum, which is the same
-    for a whole loop.
+    vote (`piko.cpu.vote`) that all hold guards the reads of all; where it fails, each
+    has its own test. So look-ups in tables have a branch for each level. A vote is by
+    all lanes, so no read waits for the mask that a test makes: a test that is alone
+    becomes one, too. Sizes that one index is compared with become their minimum, which
+    is the same for a whole loop, and indices with one size their maximum.
 
     **Guarantees** the same numbers and the same errors: nothing that may change what a
     test reads stands between it and the first.
@@ -242,7 +243,9 @@ def CombineBounds : Pass<"piko-combine-bounds", "::piko::PipelineOp"> {
     ```
     After:
     ```
-    %all = arith.andi %i_inside, %j_inside : i1
+    %largest = arith.maxui %i, %j : i32
+    %inside = arith.cmpi ult, %largest_index, %n : index
+    %all = piko.cpu.vote %inside
     %xy:2 = scf.if %all -> (i32, i32) {
       %1 = piko.load checked @table[%i : i32] "value" : i32
       %2 = piko.load checked @table[%j : i32] "value" : i32
@@ -258,7 +261,8 @@ def CombineBounds : Pass<"piko-combine-bounds", "::piko::PipelineOp"> {
   let options = [
     Option<"maxTests", "max-tests", "size_t", "8",
            "How many tests become one">];
-  let dependentDialects = ["::mlir::arith::ArithDialect", "::mlir::scf::SCFDialect"];
+  let dependentDialects = ["::mlir::arith::ArithDialect", "::mlir::scf::SCFDialect",
+                           "::piko::PikoDialect"];
 }
 
 def ThreadJumps : Pass<"piko-thread-jumps", "::piko::PipelineOp"> {

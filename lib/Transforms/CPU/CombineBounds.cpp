@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-combine-bounds: indices that do not depend on each other's elements are
-// tested at once:
+// tested at once, for all lanes:
 //   1. tests of a block whose indices vary alike become neighbours;
-//   2. a condition that all hold guards the reads of all, and where it does not
-//      hold each has its own test.
+//   2. a vote that all hold guards the reads of all, and where it does not hold
+//      each has its own test.
 
 #include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Transforms/Passes.h"
 #include "Support/StateAccess.h"
 
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
+#include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/IR/IRMapping.h"
 #include "mlir/Interfaces/LoopLikeInterface.h"
@@ -208,31 +209,51 @@ void Combiner::closeFor(Operation &op) {
 // One test
 //===----------------------------------------------------------------------===//
 
+/// The largest of two indices. Both may be numbers of 32 bits whose sign is
+/// extended: so is their largest one, as a negative one is larger than others.
+static Value createLargest(CodeBuilder at, Value a, Value b) {
+  auto narrow = [](Value index) {
+    auto cast = index.getDefiningOp<arith::IndexCastOp>();
+    return cast && cast.getIn().getType().isInteger(32) ? cast.getIn()
+                                                        : Value();
+  };
+  if (narrow(a) && narrow(b))
+    return arith::IndexCastOp::create(
+        at.builder, at.loc, a.getType(),
+        arith::MaxUIOp::create(at.builder, at.loc, narrow(a), narrow(b)));
+  return arith::MaxUIOp::create(at.builder, at.loc, a, b);
+}
+
 /// Whether all tests hold. Tests of one index against several sizes compare it
-/// with the least, which is the same for a whole loop.
+/// with the least, which is the same for a whole loop; those of several against
+/// one size compare the largest.
 static Value createAll(CodeBuilder at, ArrayRef<scf::IfOp> tests) {
-  llvm::MapVector<Value, llvm::SetVector<Value>> byIndex; // conditions
+  if (tests.size() == 1)
+    return scf::IfOp(tests.front()).getCondition();
+  using Values = llvm::SetVector<Value>;
+  llvm::MapVector<Value, Values> limits; // of indices
+  Values others;
   for (scf::IfOp test : tests) {
-    Value condition = test.getCondition();
-    auto compare = condition.getDefiningOp<arith::CmpIOp>();
-    bool isIndex = compare && compare.getPredicate() == CodeBuilder::P::ult &&
-                   compare.getLhs().getType().isIndex();
-    byIndex[isIndex ? compare.getLhs() : condition].insert(condition);
+    auto compare = test.getCondition().getDefiningOp<arith::CmpIOp>();
+    if (compare && compare.getPredicate() == CodeBuilder::P::ult &&
+        compare.getLhs().getType().isIndex())
+      limits[compare.getLhs()].insert(compare.getRhs());
+    else
+      others.insert(test.getCondition());
+  }
+  llvm::MapVector<Value, Value> largest; // by limit
+  for (auto &[index, sizes] : limits) {
+    Value least = sizes.front();
+    for (Value size : llvm::drop_begin(sizes))
+      least = arith::MinUIOp::create(at.builder, at.loc, least, size);
+    Value &known = largest[least];
+    known = known ? createLargest(at, known, index) : index;
   }
   Value all;
-  for (auto &[index, conditions] : byIndex) {
-    Value condition = conditions.front();
-    if (conditions.size() > 1) {
-      auto sizes = llvm::map_range(conditions, [](Value each) {
-        return each.getDefiningOp<arith::CmpIOp>().getRhs();
-      });
-      Value least = *sizes.begin();
-      for (Value size : llvm::drop_begin(sizes))
-        least = arith::MinUIOp::create(at.builder, at.loc, least, size);
-      condition = at.compare(CodeBuilder::P::ult, index, least);
-    }
+  for (auto [limit, index] : largest)
+    others.insert(at.compare(CodeBuilder::P::ult, index, limit));
+  for (Value condition : others)
     all = all ? at.both(all, condition) : condition;
-  }
   return all;
 }
 
@@ -243,8 +264,9 @@ static void combine(ArrayRef<scf::IfOp> tests) {
   SmallVector<Type> types;
   for (scf::IfOp test : tests)
     llvm::append_range(types, test.getResultTypes());
-  auto all = scf::IfOp::create(builder, first.getLoc(), types,
-                               createAll(at, tests), /*withElseRegion=*/true);
+  Value vote = VoteOp::create(builder, first.getLoc(), createAll(at, tests));
+  auto all = scf::IfOp::create(builder, first.getLoc(), types, vote,
+                               /*withElseRegion=*/true);
   constexpr double nearlyAlways = 1 - 1e-6;
   setProbability(all, nearlyAlways);
   SmallVector<Value> reads, results;
@@ -279,15 +301,18 @@ void Combiner::run() {
   }
   llvm::append_range(closed, std::move(open));
   for (const Group &group : closed)
-    if (group.tests.size() > 1)
-      combine(group.tests);
+    combine(group.tests);
 }
 
 void CombineBoundsPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>()) {
     llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
     SmallVector<Block *> blocks;
-    kernel.walk([&](Block *block) { blocks.push_back(block); });
+    kernel.walk([&](Block *block) {
+      auto around = dyn_cast<scf::IfOp>(block->getParentOp());
+      if (!around || !around.getCondition().getDefiningOp<VoteOp>())
+        blocks.push_back(block);
+    });
     for (Block *block : blocks)
       Combiner(*block, written, maxTests).run();
   }

@@ -117,6 +117,18 @@ static std::string describeAccessed(Operation *op) {
   return "an array";
 }
 
+/// Whether lanes come to an operation only where a vote has failed.
+static bool isFallback(Operation *op) {
+  for (Region *region = op->getParentRegion(); region;
+       region = region->getParentRegion()) {
+    auto choice = dyn_cast<scf::IfOp>(region->getParentOp());
+    if (choice && region == &choice.getElseRegion() &&
+        choice.getCondition().getDefiningOp<VoteOp>())
+      return true;
+  }
+  return false;
+}
+
 /// Where lanes access elements in different places, by line, and what share of
 /// the estimate that is; but for primitives, which are where they are.
 static void addGathers(InFlightDiagnostic &remark, const IterationLanes &lanes,
@@ -130,7 +142,8 @@ static void addGathers(InFlightDiagnostic &remark, const IterationLanes &lanes,
   };
   llvm::MapVector<Location, Line> lines;
   for (auto [part, op] : cost.obstacles)
-    if (lanes.getForm(op) == LaneForm::Access && !isa<GetOp, ItemOp>(op)) {
+    if (lanes.getForm(op) == LaneForm::Access && !isa<GetOp, ItemOp>(op) &&
+        !isFallback(op)) {
       Line &line = lines[op->getLoc()];
       line.cycles += part;
       line.first = op;

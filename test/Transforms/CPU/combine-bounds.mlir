@@ -10,7 +10,9 @@ piko.record @Number {"value" : i32 at 0} size 4 align 4
 // CHECK:         scf.for %[[I:.*]] = %{{.*}} to
 // CHECK:           %[[J:.*]] = arith.addi %[[I]], %{{.*}}
 // CHECK:           %[[J_IN:.*]] = arith.cmpi ult, %[[J]], %[[SIZE:.*]]
-// CHECK:           %[[ALL:.*]] = arith.andi %{{.*}}, %[[J_IN]]
+// CHECK:           %[[LARGEST:.*]] = arith.maxui %[[I]], %[[J]] : index
+// CHECK-NEXT:      %[[IN:.*]] = arith.cmpi ult, %[[LARGEST]], %[[SIZE]]
+// CHECK-NEXT:      %[[ALL:.*]] = piko.cpu.vote %[[IN]]
 // CHECK-NEXT:      %[[AB:.*]]:2 = scf.if %[[ALL]] -> (i32, i32) {
 // CHECK-NEXT:        %[[A:.*]] = piko.load checked @table[%[[I]] : index]
 // CHECK-NEXT:        %[[B:.*]] = piko.load checked @table[%[[J]] : index]
@@ -26,10 +28,17 @@ piko.record @Number {"value" : i32 at 0} size 4 align 4
 // CHECK:           } {piko.probability =
 // CHECK:           arith.index_cast %[[AB]]#0
 // CHECK:           arith.index_cast %[[AB]]#1
-// CHECK:           scf.if %{{.*}} -> (i32, i32) {
+// CHECK:           %[[NEXT:.*]] = arith.maxui %[[K:.*]], %[[L:.*]] : i32
+// CHECK-NEXT:      %[[WIDE:.*]] = arith.index_cast %[[NEXT]] : i32 to index
+// CHECK-NEXT:      %[[BOTH:.*]] = arith.cmpi ult, %[[WIDE]], %[[SIZE]]
+// CHECK-NEXT:      %[[VOTE:.*]] = piko.cpu.vote %[[BOTH]]
+// CHECK-NEXT:      scf.if %[[VOTE]] -> (i32, i32) {
 // CHECK-NOT:       -> (i32, i32)
 // ONE-LABEL: piko.kernel @chains
 // ONE-NOT:     -> (i32, i32)
+// ONE:         %[[VOTE:.*]] = piko.cpu.vote
+// ONE-NEXT:    scf.if %[[VOTE]] -> (i32) {
+// ONE-NEXT:      piko.load checked @table
 piko.pipeline @P rank 1 {
   piko.buffer @table : @Number
   piko.buffer @out : @Number
@@ -97,18 +106,22 @@ piko.record @Number {"value" : i32 at 0} size 4 align 4
 // CHECK:         scf.for %[[J:[a-z0-9]+]] =
 // CHECK:           scf.for %[[I:[a-z0-9]+]] =
 // CHECK:             %[[MIN:.*]] = arith.minui %{{.*}}, %{{.*}} : index
-// CHECK-NEXT:        %[[ALL:.*]] = arith.cmpi ult, %[[I]], %[[MIN]]
+// CHECK-NEXT:        %[[IN:.*]] = arith.cmpi ult, %[[I]], %[[MIN]]
+// CHECK-NEXT:        %[[ALL:.*]] = piko.cpu.vote %[[IN]]
 // CHECK-NEXT:        scf.if %[[ALL]] -> (i32, i32) {
 // CHECK-NEXT:          piko.load checked @table[%[[I]] : index]
 // CHECK-NEXT:          piko.load checked @out[%[[I]] : index]
 // CHECK:             } {piko.probability =
-// CHECK:             scf.if %{{.*}} -> (i32) {
+// CHECK:             %[[J_VOTE:.*]] = piko.cpu.vote
+// CHECK-NEXT:        scf.if %[[J_VOTE]] -> (i32) {
 // CHECK-NEXT:          piko.load checked @table[%[[J]] : index]
 // CHECK:             piko.store
-// CHECK-NEXT:        scf.if %{{.*}} -> (i32) {
+// CHECK:             %[[OUT_VOTE:.*]] = piko.cpu.vote
+// CHECK-NEXT:        scf.if %[[OUT_VOTE]] -> (i32) {
 // CHECK-NEXT:          piko.load checked @out[%[[I]] : index]
 // CHECK:             scf.for
-// CHECK:             scf.if %{{.*}} -> (i32) {
+// CHECK:             %[[I_VOTE:.*]] = piko.cpu.vote
+// CHECK-NEXT:        scf.if %[[I_VOTE]] -> (i32) {
 // CHECK-NEXT:          piko.load checked @table[%[[I]] : index]
 piko.pipeline @P rank 1 {
   piko.buffer @table : @Number

@@ -92,6 +92,16 @@ struct ElectLowering : Lowering<ElectOp> {
   }
 };
 
+struct VoteLowering : Lowering<VoteOp> {
+  using Lowering::Lowering;
+  LogicalResult
+  matchAndRewrite(VoteOp op, OpAdaptor adaptor,
+                  ConversionPatternRewriter &rewriter) const override {
+    rewriter.replaceOp(op, adaptor.getCondition());
+    return success();
+  }
+};
+
 struct LocalBinLowering : Lowering<LocalBinOp> {
   using Lowering::Lowering;
   LogicalResult
@@ -306,13 +316,14 @@ struct PlaceLowering : Lowering<AppendBinOp> {
 void piko::populateWriterToLLVMPatterns(const TypeConverter &converter,
                                         RewritePatternSet &patterns,
                                         LoweringContext &context) {
-  patterns.add<
-      OpenWriterLowering, ElectLowering, TakesVectorsLowering, LocalBinLowering,
-      WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
-      IsCountedLowering, WriterCallLowering<ReorderEndOp, reorderEnd>,
-      WriterNumberLowering<ReorderBeginOp, reorderBegin>,
-      WriterNumberLowering<ReorderIterationOp, reorderIteration>,
-      WriterNumberLowering<ScratchReleaseOp, scratchRelease>,
-      ScratchMarkLowering, ScratchLowering, AppendLowering, PlaceLowering>(
-      converter, patterns.getContext(), context);
+  patterns
+      .add<OpenWriterLowering, ElectLowering, VoteLowering,
+           TakesVectorsLowering, LocalBinLowering,
+           WriterCallLowering<CloseWriterOp, closeWriter>, NextLowering,
+           IsCountedLowering, WriterCallLowering<ReorderEndOp, reorderEnd>,
+           WriterNumberLowering<ReorderBeginOp, reorderBegin>,
+           WriterNumberLowering<ReorderIterationOp, reorderIteration>,
+           WriterNumberLowering<ScratchReleaseOp, scratchRelease>,
+           ScratchMarkLowering, ScratchLowering, AppendLowering, PlaceLowering>(
+          converter, patterns.getContext(), context);
 }

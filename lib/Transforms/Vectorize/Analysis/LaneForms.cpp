@@ -429,6 +429,8 @@ LaneForm LaneForms::getForm(Operation *op) const {
     if (Attribute pixels = getPixels(store); pixels && shared.contains(pixels))
       return LaneForm::Ordered;
   auto varies = [&](Value value) { return isVarying(value); };
+  if (auto vote = dyn_cast<VoteOp>(op); vote && varies(vote.getCondition()))
+    return LaneForm::Vector;
   bool isUniform = op->getNumRegions() == 0 && op->getNumResults() > 0 &&
                    llvm::none_of(op->getResults(), varies);
   if (isUniform && (isMemoryEffectFree(op) || isa<LoadOp, memref::LoadOp>(op)))

@@ -457,6 +457,10 @@ void CostModel::addOperation(Operation *op, Frequency times, bool laneByLane) {
     cost.vectors += counting * cycles.vector * times.vectors;
     return;
   }
+  if (isa<VoteOp>(op)) {
+    cost.vectors += 2 * cycles.vector * times.vectors;
+    return;
+  }
   if (!laneByLane && lanes.isEmission(op))
     return addEmission(op, times);
   if (auto push = dyn_cast<PushOp>(op))

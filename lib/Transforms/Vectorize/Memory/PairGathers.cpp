@@ -257,7 +257,8 @@ static Value createAreApart(CodeBuilder at, const Run &run, Value mask) {
   return createAny(at, at.both(mask, areNot));
 }
 
-static void createRun(CodeBuilder at, const Run &run, Value mask) {
+static SmallVector<Value> createRun(CodeBuilder at, const Run &run,
+                                    Value mask) {
   const Candidate &first = run.reads.front();
   SmallVector<Type> types(run.reads.size(), first.gather.getType());
   auto made = GatherRunOp::create(at.builder, at.loc, types,
@@ -268,7 +269,22 @@ static void createRun(CodeBuilder at, const Run &run, Value mask) {
     values[1] = at.select(
         at.compare(CodeBuilder::P::eq, first.index, run.reads[1].index),
         values[0], values[1]);
-  scf::YieldOp::create(at.builder, at.loc, values);
+  return values;
+}
+
+/// Whether an operation stands where some lane of a mask is known to be.
+static bool isWhereSomeAre(Operation *op, Value mask) {
+  auto guard = dyn_cast<scf::IfOp>(op->getParentOp());
+  if (!guard || op->getBlock() != guard.thenBlock())
+    return false;
+  auto isAny = [&](Value condition) {
+    auto any = condition.getDefiningOp<vector::ReductionOp>();
+    return any && any.getKind() == vector::CombiningKind::OR &&
+           any.getVector() == mask;
+  };
+  auto both = guard.getCondition().getDefiningOp<arith::AndIOp>();
+  return isAny(guard.getCondition()) ||
+         (both && (isAny(both.getLhs()) || isAny(both.getRhs())));
 }
 
 /// Reads the elements where the builder stands.
@@ -280,7 +296,7 @@ static SmallVector<Value> createReads(CodeBuilder at, const Run &run) {
   for (Value mask : ArrayRef(masks.getArrayRef()).drop_front())
     some = at.either(some, mask);
   auto readRun = [&](OpBuilder &builder, Location loc) {
-    createRun({builder, loc}, run, some);
+    scf::YieldOp::create(builder, loc, createRun({builder, loc}, run, some));
   };
   auto readApart = [&](OpBuilder &builder, Location loc) {
     SmallVector<Value> values;
@@ -304,6 +320,8 @@ static SmallVector<Value> createReads(CodeBuilder at, const Run &run) {
     scf::YieldOp::create(builder, loc,
                          SmallVector<Value>(run.reads.size(), none));
   };
+  if (areSide && isWhereSomeAre(run.reads.front().gather, some))
+    return createRun(at, run, some);
   auto guard = scf::IfOp::create(at.builder, at.loc, createAny(at, some), read,
                                  readNothing);
   return SmallVector<Value>(guard.getResults());
@@ -398,16 +416,6 @@ SmallVector<size_t> RunFinder::find(size_t first, Distance &distance) const {
   if (auto front = findBeside(first, /*isAfter=*/false, distance))
     return {*front, first};
   return run;
-}
-
-/// Whether an operation stands where some lane of a mask is known to be.
-static bool isWhereSomeAre(Operation *op, Value mask) {
-  auto guard = dyn_cast<scf::IfOp>(op->getParentOp());
-  if (!guard || op->getBlock() != guard.thenBlock())
-    return false;
-  auto any = guard.getCondition().getDefiningOp<vector::ReductionOp>();
-  return any && any.getKind() == vector::CombiningKind::OR &&
-         any.getVector() == mask;
 }
 
 void PairGathersPass::loadEach(const Candidate &candidate) {

@@ -5,6 +5,7 @@
 
 #include "Vectorize/Write/IterationWriter.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -160,6 +161,15 @@ void IterationWriter::writeElect(ElectOp elect) {
                                     builder, loc, side, ofFirst, ofSecond)));
 }
 
+void IterationWriter::writeVote(VoteOp vote) {
+  Value no = any(both(active, invert(get(vote.getCondition()))));
+  Value never = arith::ConstantIntOp::create(builder, loc, 0, 1);
+  Value all =
+      arith::CmpIOp::create(builder, loc, arith::CmpIPredicate::eq, no, never);
+  scalars.map(vote.getResult(),
+              arith::AndIOp::create(builder, loc, any(active), all));
+}
+
 void IterationWriter::writeIf(scf::IfOp choice) {
   if (!lanes.isVarying(choice.getCondition())) {
     SmallVector<Type> types;
@@ -168,6 +178,8 @@ void IterationWriter::writeIf(scf::IfOp choice) {
     bool hasElse = !choice.getElseRegion().empty();
     auto made = scf::IfOp::create(
         builder, loc, types, getUniform(choice.getCondition()), true, hasElse);
+    if (choice.getCondition().getDefiningOp<VoteOp>())
+      setProbability(made, getProbability(choice, choice.getThenRegion()));
     for (Region &region : made->getRegions())
       if (!region.empty() && !region.front().empty())
         region.front().getTerminator()->erase();

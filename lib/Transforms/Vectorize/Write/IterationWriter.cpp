@@ -155,6 +155,8 @@ bool IterationWriter::writeInside(arith::CmpIOp compare) {
 void IterationWriter::writeVector(Operation *op) {
   if (auto elect = dyn_cast<ElectOp>(op))
     return writeElect(elect);
+  if (auto vote = dyn_cast<VoteOp>(op))
+    return writeVote(vote);
   if (auto compare = dyn_cast<arith::CmpIOp>(op))
     if (writeInside(compare))
       return;

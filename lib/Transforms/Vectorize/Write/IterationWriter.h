@@ -52,6 +52,7 @@ private:
   /// Which lanes do not yet leave a turn that only some go on with.
   mlir::Value writeWaiting(mlir::Value goesOn);
   void writeElect(ElectOp elect);
+  void writeVote(VoteOp vote);
   void writeSwitch(mlir::scf::IndexSwitchOp choice);
   void writeFor(mlir::scf::ForOp inner);
   void writeVaryingFor(mlir::scf::ForOp inner);

@@ -297,6 +297,23 @@ def Piko_ElectOp : Piko_CPUOp<"elect", [NoMemoryEffect]> {
   let hasVerifier = 1;
 }
 
+def Piko_VoteOp : Piko_CPUOp<"vote", [Pure]> {
+  let summary = "whether a condition holds in all lanes that are at work";
+  let description = [{
+    The same for all lanes of a vector: true only if the condition holds in each that is
+    at work where it stands, and there is one. Where it is false, a lane may have a
+    condition that is true. So it chooses between two ways to the same result, of which
+    one is for all cases. Where there are no lanes, it is the condition.
+
+    ```mlir
+    %all = piko.cpu.vote %isInside
+    ```
+  }];
+  let arguments = (ins I1:$condition);
+  let results = (outs I1:$result);
+  let assemblyFormat = "$condition attr-dict";
+}
+
 def Piko_LocalBinOp : Piko_StorageOp<"local_bin", [
     SingleBlock, NoTerminator,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {
