@@ -49,7 +49,7 @@ struct Minimum : piko::Stage<0, 0, 64, Item, Item>, piko::Uses<State> {
 // CHECK-NOT: math.sin
 struct Sine : piko::Stage<0, 0, 64, Item>, piko::Uses<State> {
   void process(const Item &item) {
-    // WARNING: numbers.cpp:[[#@LINE + 1]]:25: warning: 'sin' is compiled as piko::sin: a plain C++ build of this file may differ
+    // WARNING: numbers.cpp:[[#@LINE + 1]]:25: warning: 'sin' is compiled as piko::sin: a plain C++ build of this file may differ, unless you write that
     state().floats[0] = std::sin(item.a);
   }
 };

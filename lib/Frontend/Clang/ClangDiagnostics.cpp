@@ -6,6 +6,7 @@
 #include "Parse/PipeSearch.h"
 #include "Parse/Wrappers.h"
 #include "mlir/IR/BuiltinAttributes.h"
+#include "Clang/Remedies.h"
 #include "clang/Basic/DiagnosticIDs.h"
 #include "clang/Basic/DiagnosticSema.h"
 #include "clang/Sema/Sema.h"
@@ -27,7 +28,7 @@ mlir::Location piko::convertLocation(clang::SourceLocation location,
 }
 
 void ClangDiagnosticForwarder::flush() {
-  if (pending)
+  if (pending && !followsTunable)
     context.getDiagEngine().emit(std::move(*pending));
   pending.reset();
 }
@@ -121,11 +122,27 @@ bool ClangDiagnosticForwarder::rewriteTunable(const clang::Diagnostic &info,
       convertLocation(info.getLocation(), info.getSourceManager(), context);
   pending.reset();
   isExplained = true;
-  if (std::exchange(tunable, better) == better)
+  if (!tunables.insert(better).second)
     return true;
   pending.emplace(location, mlir::DiagnosticSeverity::Error);
   *pending << better;
+  followsTunable = false;
   return true;
+}
+
+bool ClangDiagnosticForwarder::rewriteError(const clang::Diagnostic &info,
+                                            llvm::StringRef note) {
+  const clang::CXXRecordDecl *stage =
+      pending && sema && phase.empty() ? findStage(*sema) : nullptr;
+  if (!stage)
+    return false;
+  std::string better = explainNote(pending->str(), note, isInLanguage(info),
+                                   stage->getNameAsString());
+  if (better.empty())
+    return false;
+  pending.emplace(pending->getLocation(), pending->getSeverity());
+  *pending << better;
+  return isExplained = true;
 }
 
 void ClangDiagnosticForwarder::HandleDiagnostic(
@@ -149,9 +166,14 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
     *pending << error;
     isMisplaced = false;
     return;
-  } else if (isExplained) {
+  } else if (isExplained || rewriteError(info, text)) {
     return;
   }
+  if (level == clang::DiagnosticsEngine::Error && sema && findStage(*sema))
+    if (std::string better = explainError(text); !better.empty()) {
+      text = better;
+      isExplained = true;
+    }
   if (std::string better = explainState(info.getID(), text, sema);
       !better.empty()) {
     text = better;
@@ -185,5 +207,7 @@ void ClangDiagnosticForwarder::HandleDiagnostic(
                                 ? mlir::DiagnosticSeverity::Warning
                                 : mlir::DiagnosticSeverity::Error);
   *pending << text.str();
+  followsTunable =
+      level >= clang::DiagnosticsEngine::Error && !tunables.empty();
   phase = getPhase(info);
 }

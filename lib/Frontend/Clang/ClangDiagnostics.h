@@ -8,6 +8,8 @@
 #include "clang/Basic/SourceManager.h"
 
 #include <optional>
+#include <set>
+#include <string>
 
 namespace clang {
 class Sema;
@@ -39,6 +41,9 @@ private:
   /// Where a note is about a tunable that has no such value, puts our text in
   /// the place of the error, once.
   bool rewriteTunable(const clang::Diagnostic &info, llvm::StringRef note);
+  /// Where a note says which rule of the language an error in a stage's text is
+  /// about, puts our text in the place of the error.
+  bool rewriteError(const clang::Diagnostic &info, llvm::StringRef note);
 
   mlir::MLIRContext &context;
   const clang::Sema *sema = nullptr;
@@ -47,9 +52,11 @@ private:
   bool isExplained = false;
   /// Whether that is about a call in the user's text, which a note will name.
   bool isMisplaced = false;
-  /// The last text of ours about a tunable, which Clang may have two errors
-  /// for.
-  std::string tunable;
+  /// The texts of ours about tunables, each of which Clang may have several
+  /// errors for.
+  std::set<std::string> tunables;
+  /// Whether the diagnostic may follow from that, so that it is not said.
+  bool followsTunable = false;
   /// If it is about a wrapper's call of a phase: how the phase is declared.
   std::string phase;
 };

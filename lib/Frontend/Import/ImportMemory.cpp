@@ -405,7 +405,10 @@ LogicalResult MemoryImporter::expectUnordered(llvm::CallInst *call,
                     << (isFetch ? "an atomic that returns the old value"
                                 : "an atomic on a float")
                     << " in a stage that is Unordered, but stage '"
-                    << stage.name << "' is not";
+                    << stage.name
+                    << "' is not; say specifyOrder(piko::Unordered) in its "
+                       "schedule, or take "
+                    << (isFetch ? "one that returns nothing" : "an integer");
 }
 
 LogicalResult MemoryImporter::importAtomic(llvm::CallInst *call) {

@@ -140,7 +140,7 @@ static void warn(llvm::CallInst *call, llvm::StringRef name, ParsedUnit &unit,
   if (unit.warned.insert(location).second)
     mlir::emitWarning(location)
         << "'" << name << "' is compiled as piko::" << name
-        << ": a plain C++ build of this file may differ";
+        << ": a plain C++ build of this file may differ, unless you write that";
 }
 
 bool piko::redirectMathCalls(llvm::Function &function, ParsedUnit &unit,

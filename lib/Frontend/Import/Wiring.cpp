@@ -145,7 +145,13 @@ private:
         InFlightDiagnostic diagnostic = fail(call);
         diagnostic << "port " << *port << " of stage '" << from.name
                    << "' is connected twice";
-        diagnostic.attachNote(edge.location) << "it is connected here";
+        diagnostic.attachNote(edge.location)
+            << "it is connected here, and a port has one edge";
+        llvm::StringRef type = pipeline.records[from.outputs[*port]].name;
+        diagnostic.attachNote(from.location)
+            << "for two edges give the stage a port more, '" << type << "', '"
+            << type << "' behind its input in piko::Stage<...>, and emit to "
+            << "both: emit(value, 0), emit(value, 1)";
         return false;
       }
     if (from.outputs[*port] != to.input) {
@@ -156,7 +162,9 @@ private:
                  << "' and stage '" << to.name << "' takes '"
                  << pipeline.records[to.input].name << "'";
       diagnostic.attachNote(to.location)
-          << "stage '" << to.name << "' is declared here";
+          << "stage '" << to.name
+          << "' is declared here; a stage takes one type, the first in "
+             "piko::Stage<...>, and those behind it are its ports'";
       return false;
     }
     pipeline.edges.push_back({*producer, static_cast<unsigned>(*port),

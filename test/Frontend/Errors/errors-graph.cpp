@@ -39,8 +39,9 @@ struct Twice : piko::Pipe<> {
   DrainA drain;
   Twice() {
     source(pass);
-    // TWICE: errors-graph.cpp:[[#@LINE + 3]]:5: error: port 0 of stage 'pass' is connected twice
-    // TWICE: errors-graph.cpp:[[#@LINE + 1]]:5: note: it is connected here
+    // TWICE: errors-graph.cpp:[[#@LINE + 4]]:5: error: port 0 of stage 'pass' is connected twice
+    // TWICE: errors-graph.cpp:[[#@LINE + 2]]:5: note: it is connected here, and a port has one edge
+    // TWICE: errors-graph.cpp:[[#@LINE - 6]]:8: note: for two edges give the stage a port more, 'A', 'A' behind its input in piko::Stage<...>, and emit to both: emit(value, 0), emit(value, 1)
     connect(pass, 0, drain);
     connect(pass, 0, drain);
   }
@@ -49,7 +50,7 @@ struct Twice : piko::Pipe<> {
 struct Mismatch : piko::Pipe<> {
   Pass pass;
   // MISMATCH: errors-graph.cpp:[[#@LINE + 5]]:5: error: expected an edge between equal types, but port 0 of stage 'pass' emits 'A' and stage 'drain' takes 'B'
-  // MISMATCH: errors-graph.cpp:[[#@LINE + 1]]:10: note: stage 'drain' is declared here
+  // MISMATCH: errors-graph.cpp:[[#@LINE + 1]]:10: note: stage 'drain' is declared here; a stage takes one type, the first in piko::Stage<...>, and those behind it are its ports'
   DrainB drain;
   Mismatch() {
     source(pass);

@@ -78,10 +78,10 @@ struct One : piko::Stage<8, 8, 64, int, int>, piko::Uses<State> {
   }
   void process(const int &i) {
 #if CASE == 9
-    // FETCH: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected an atomic that returns the old value in a stage that is Unordered, but stage 'one' is not
+    // FETCH: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected an atomic that returns the old value in a stage that is Unordered, but stage 'one' is not; say specifyOrder(piko::Unordered) in its schedule, or take one that returns nothing
     piko::atomicAddFetch(state().buffer[0], i);
 #elif CASE == 10
-    // FLOAT: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected an atomic on a float in a stage that is Unordered, but stage 'one' is not
+    // FLOAT: errors-schedule.cpp:[[#@LINE + 1]]:5: error: expected an atomic on a float in a stage that is Unordered, but stage 'one' is not; say specifyOrder(piko::Unordered) in its schedule, or take an integer
     piko::atomicAdd(state().floats[0], 2.0f);
 #elif CASE == 11
     // LOCAL: errors-schedule.cpp:[[#@LINE + 2]]:5: error: expected an atomic that returns the old value in a stage that is Unordered, but stage 'one' is not
