@@ -7,6 +7,7 @@
 #include "Import/Conflicts.h"
 #include "Import/ModuleBuilder.h"
 #include "Import/Wiring.h"
+#include "Parse/Tunables.h"
 #include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Canonicalization.h"
 #include "Piko/Dialect/Piko/IR/Piko.h"
@@ -188,9 +189,7 @@ static bool isSameValue(llvm::StringRef written, llvm::StringRef value) {
 static llvm::FailureOr<std::string>
 writeTunable(llvm::ArrayRef<TunableDescription> tunables, llvm::StringRef name,
              llvm::StringRef value, mlir::Location file) {
-  std::vector<std::string> names;
   for (const TunableDescription &tunable : tunables) {
-    names.push_back("'" + tunable.name + "'");
     if (tunable.name != name)
       continue;
     for (auto [written, text] : llvm::zip(tunable.values, tunable.texts))
@@ -200,21 +199,50 @@ writeTunable(llvm::ArrayRef<TunableDescription> tunables, llvm::StringRef name,
            << "expected " << listAlternatives(tunable.values)
            << " for tunable '" << name << "', but got " << value;
   }
-  if (names.empty())
-    return mlir::emitError(file)
-           << "expected a tunable '" << name << "', but the text has none";
-  return mlir::emitError(file)
-         << "expected a tunable '" << name << "', but the text has "
-         << llvm::join(names, ", ");
+  return refuseTunable(name, tunables, file);
+}
+
+/// Whether a value may be an enumerator's name, which only the text knows.
+static bool isName(llvm::StringRef value) {
+  return !value.empty() && (llvm::isAlpha(value.front()) || value[0] == '_') &&
+         value != "true" && value != "false";
+}
+
+/// Writes the enumerators that PIKO_TUNED names as their numbers.
+static llvm::LogicalResult numberEnumerators(llvm::StringRef file,
+                                             FrontendOptions &options,
+                                             mlir::Location location,
+                                             mlir::MLIRContext &context) {
+  auto named = llvm::find_if(options.defines, [](llvm::StringRef define) {
+    return llvm::any_of(readTunedMacro(define), [](TunedMacro setting) {
+      return isName(setting.value);
+    });
+  });
+  if (named == options.defines.end())
+    return llvm::success();
+  FrontendOptions others = options;
+  llvm::erase(others.defines, *named);
+  auto tunables = listTunables(file, others, context);
+  if (failed(tunables))
+    return failure();
+  std::vector<std::string> settings;
+  for (auto [name, value] : readTunedMacro(*named)) {
+    auto setting = writeTunable(*tunables, name, value, location);
+    if (failed(setting))
+      return failure();
+    settings.push_back(std::move(*setting));
+  }
+  *named = "PIKO_TUNED=\"" + llvm::join(settings, ";") + "\"";
+  return llvm::success();
 }
 
 llvm::LogicalResult
 piko::setTunables(llvm::StringRef file,
                   llvm::ArrayRef<std::pair<std::string, std::string>> values,
                   FrontendOptions &options, mlir::MLIRContext &context) {
-  if (values.empty())
-    return llvm::success();
   mlir::Location location = mlir::FileLineColLoc::get(&context, file, 1, 1);
+  if (values.empty())
+    return numberEnumerators(file, options, location, context);
   if (isTuned(options))
     return mlir::emitError(location) << "expected tunables in a tuned file or "
                                         "in PIKO_TUNED, but got both";

@@ -7,6 +7,7 @@
 // RUN: pikoc %s --emit=authored -o - | FileCheck %s --check-prefixes=CHECK,STANDARD
 // RUN: pikoc %s '-DPIKO_TUNED="bin=16;step=-3;eps=1e-20;mode=5;more=true"' --emit=authored -o - | FileCheck %s --check-prefixes=CHECK,TUNED
 // RUN: pikoc %s --no-cache '-DPIKO_TUNED="bin=16;step=-3;eps=1e-20;mode=5;more=1"' --emit=authored -o - | FileCheck %s --check-prefixes=CHECK,TUNED
+// RUN: pikoc %s '-DPIKO_TUNED="bin=16;step=-3;eps=1e-20;mode=Exact;more=true;numbers=Strict"' --emit=authored -o - | FileCheck %s --check-prefixes=CHECK,TUNED
 // RUN: %cxx_after_header -fsyntax-only %s
 // RUN: %if all %{ %cxx_reference -fsyntax-only -DTUNED '-DPIKO_TUNED="bin=16;step=-3;eps=1e-20;mode=5;more=true"' %s %}
 // RUN: %if all %{ %other_cxx -std=c++20 -I%piko_include -fsyntax-only -DTUNED '-DPIKO_TUNED="bin=16;step=-3;eps=1e-20;mode=5;more=true"' %s %}

@@ -92,7 +92,8 @@ listTunables(llvm::StringRef file, const FrontendOptions &options,
 
 /// Defines PIKO_TUNED so that the file's tunables have these values, by their
 /// names, as listTunables() writes them. An error if the file has no such
-/// tunable, or it no such value.
+/// tunable, or it no such value. Without values, a PIKO_TUNED that names
+/// enumerators gets their numbers.
 llvm::LogicalResult
 setTunables(llvm::StringRef file,
             llvm::ArrayRef<std::pair<std::string, std::string>> values,

@@ -5,6 +5,7 @@
 #include "Clang/ClangInvocation.h"
 
 #include "clang/Driver/CreateInvocationFromArgs.h"
+#include "llvm/ADT/StringExtras.h"
 
 using namespace piko;
 
@@ -44,6 +45,17 @@ bool piko::isTuned(const FrontendOptions &options) {
   return llvm::any_of(options.defines, [](llvm::StringRef define) {
     return getMacroName(define) == "PIKO_TUNED";
   });
+}
+
+llvm::SmallVector<TunedMacro> piko::readTunedMacro(llvm::StringRef define) {
+  llvm::SmallVector<TunedMacro> settings;
+  if (getMacroName(define) != "PIKO_TUNED")
+    return settings;
+  llvm::StringRef text = define.split('=').second.trim('"');
+  for (llvm::StringRef part : llvm::split(text, ';'))
+    if (auto [name, value] = part.split('='); !name.empty())
+      settings.push_back({name, value});
+  return settings;
 }
 
 std::shared_ptr<clang::CompilerInvocation> piko::createClangInvocation(

@@ -23,6 +23,14 @@ std::vector<std::string> getClangArguments(llvm::ArrayRef<const char *> flags,
 /// Whether the macros define PIKO_TUNED.
 bool isTuned(const FrontendOptions &options);
 
+/// A setting of a macro PIKO_TUNED.
+struct TunedMacro {
+  llvm::StringRef name, value;
+};
+/// What a macro's definition as PIKO_TUNED="name=value;..." sets, in its order;
+/// empty of another macro.
+llvm::SmallVector<TunedMacro> readTunedMacro(llvm::StringRef define);
+
 /// The name of a macro that `-D` defines.
 llvm::StringRef getMacroName(llvm::StringRef define);
 

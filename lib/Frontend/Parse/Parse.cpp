@@ -428,6 +428,20 @@ static llvm::LogicalResult checkTuned(const FrontendOptions &options,
   return llvm::success();
 }
 
+/// Refuses a name in PIKO_TUNED that is no tunable's.
+static llvm::LogicalResult
+checkTunedNames(const FrontendOptions &options,
+                llvm::ArrayRef<TunableDescription> tunables,
+                mlir::Location file) {
+  for (llvm::StringRef define : options.defines)
+    for (const TunedMacro &setting : readTunedMacro(define))
+      if (llvm::none_of(tunables, [&](const TunableDescription &tunable) {
+            return tunable.name == setting.name;
+          }))
+        return refuseTunable(setting.name, tunables, file);
+  return llvm::success();
+}
+
 llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
                                             mlir::MLIRContext &context) {
   mlir::Location fileLocation =
@@ -521,9 +535,10 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
     return llvm::failure();
   ParsedFile result;
   result.pipes = std::move(reader.pipes);
-  if (request.goal == ParseGoal::ListTunables) {
+  if (request.goal == ParseGoal::ListTunables || isTuned(request.options)) {
     auto tunables = findTunables(compiler.getASTContext(), context);
-    if (failed(tunables))
+    if (failed(tunables) ||
+        failed(checkTunedNames(request.options, *tunables, fileLocation)))
       return llvm::failure();
     result.tunables = std::move(*tunables);
   }

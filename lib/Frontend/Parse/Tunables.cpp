@@ -146,6 +146,18 @@ bool TunableFinder::add(TunableDescription tunable) {
   return false;
 }
 
+llvm::LogicalResult
+piko::refuseTunable(llvm::StringRef name,
+                    llvm::ArrayRef<TunableDescription> tunables,
+                    mlir::Location file) {
+  std::vector<std::string> names;
+  for (const TunableDescription &tunable : tunables)
+    names.push_back("'" + tunable.name + "'");
+  return mlir::emitError(file)
+         << "expected a tunable '" << name << "', but the text has "
+         << (names.empty() ? "none" : llvm::join(names, ", "));
+}
+
 llvm::FailureOr<std::vector<TunableDescription>>
 piko::findTunables(clang::ASTContext &ast, mlir::MLIRContext &context) {
   TunableFinder finder(ast, context);

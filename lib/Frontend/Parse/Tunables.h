@@ -14,6 +14,11 @@ namespace piko {
 llvm::FailureOr<std::vector<TunableDescription>>
 findTunables(clang::ASTContext &ast, mlir::MLIRContext &context);
 
+/// Reports a name that is none of these tunables'.
+llvm::LogicalResult refuseTunable(llvm::StringRef name,
+                                  llvm::ArrayRef<TunableDescription> tunables,
+                                  mlir::Location file);
+
 } // namespace piko
 
 #endif // PIKO_LIB_FRONTEND_PARSE_TUNABLES_H
