@@ -8,6 +8,7 @@
 #include "Explain/ExplainKernels.h"
 
 #include "Piko/Analysis/StageGraph.h"
+#include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Dialect/Piko/IR/PikoProgram.h"
 #include "Piko/Driver/Compiler.h"
 #include "Piko/Driver/PassReport.h"
@@ -274,8 +275,9 @@ void Report::writeWaits(StageOp stage) {
 
 void Report::writeStage(StageOp stage) {
   out << "  " << stage.getSymName();
-  if (auto label = stage.getLabel())
-    out << " ('" << *label << "')";
+  // A member that is called as a part of the state has another symbol.
+  if (StringRef name = getCppName(stage); name != stage.getSymName())
+    out << " ('" << name << "')";
   out << ": " << describeBins(stage) << ", " << stage.getThreads()
       << " threads, " << describeSchedule(stage);
   if (ScheduleOp schedule = stage.getSchedule();

@@ -6,7 +6,8 @@
 // takes its port, or to the next process phase where there is none; it is bold
 // where a local barrier keeps what it carries in a bin. A dotted edge leads to
 // the process phases of the stages that were fused with it. A schedule that has
-// code of its own is a kernel, too. Of the program, strips, waves and rounds
+// code of its own is a kernel, too. An edge that is dashed and red leads from a
+// stage to one that waits for its end. Of the program, strips, waves and rounds
 // are boxes around kernels, and the way to join is said at edges.
 
 #include "Piko/Target/Graphviz.h"
@@ -40,6 +41,7 @@ private:
   void writeSource(SourceOp source, int64_t number);
   void writeEdge(EdgeOp edge);
   void writeDrain(StageOp stage);
+  void writeWaits(StageOp stage);
   /// The node of a stage's process phase.
   std::string processNode(StringRef stage);
   /// The nodes of assign phases that take a port of a stage on its way to a
@@ -243,6 +245,16 @@ void DotWriter::writeDrain(StageOp stage) {
          << " [style=dashed];\n";
 }
 
+void DotWriter::writeWaits(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  if (!schedule || !schedule.getEndStageAttr())
+    return;
+  for (auto name : schedule.getEndStageAttr().getAsRange<FlatSymbolRefAttr>())
+    stream << "  " << processNode(name.getValue()) << " -> "
+           << processNode(stage.getSymName())
+           << " [label=\"endStage\", style=dashed, color=red];\n";
+}
+
 void DotWriter::write() {
   stream << "digraph " << quote(pipeline.getSymName())
          << " {\n  node [shape=box];\n";
@@ -267,6 +279,8 @@ void DotWriter::write() {
   for (auto stage : pipeline.getOps<StageOp>())
     if (stage.getOutputs().empty())
       writeDrain(stage);
+  for (auto stage : pipeline.getOps<StageOp>())
+    writeWaits(stage);
   stream << "}\n";
 }
 
