@@ -227,6 +227,7 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
     if (std::unique_ptr<llvm::MemoryBuffer> found =
             cache.lookUp(request, *files)) {
       Entry entry = readEntry(found->getBuffer());
+      entry.object.isFromCache = true;
       diagnostics += entry.diagnostics;
       return std::move(entry.object);
     }

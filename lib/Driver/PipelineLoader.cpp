@@ -19,11 +19,12 @@ namespace {
 class JITProgram : public LoadedProgram {
 public:
   JITProgram(std::unique_ptr<JITCode> code, const pikort_program *found,
-             double taken, uint64_t codeHash)
+             double taken, const CompiledObject &object)
       : code(std::move(code)) {
     program = found;
     milliseconds = taken;
-    hash = codeHash;
+    hash = llvm::xxh3_64bits(object.code);
+    fromCache = object.isFromCache;
   }
 
 private:
@@ -79,7 +80,7 @@ static std::unique_ptr<LoadedProgram> loadHere(CompileOptions source,
   std::chrono::duration<double, std::milli> taken =
       std::chrono::steady_clock::now() - start;
   return std::make_unique<JITProgram>(std::move(*code), *program, taken.count(),
-                                      llvm::xxh3_64bits(object->code));
+                                      *object);
 }
 
 /// A host's stack may be small, and a text deep; and it lives on.

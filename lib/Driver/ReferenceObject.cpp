@@ -33,6 +33,7 @@ struct Adapter {
   std::string text;
   std::vector<std::string> defines, pipelines, files;
   std::string diagnostics;
+  bool isFromCache = false;
 };
 
 /// The second step.
@@ -42,6 +43,7 @@ struct HostObject {
   bool needsHeader = false;
   std::vector<std::string> files;
   std::string diagnostics;
+  bool isFromCache = false;
 };
 
 } // namespace
@@ -109,6 +111,7 @@ static bool findOrMake(const CacheOptions &options, llvm::StringRef request,
     if (std::unique_ptr<llvm::MemoryBuffer> found =
             cache.lookUp(request, *files)) {
       read(found->getBuffer(), made);
+      made.isFromCache = true;
       diagnostics += made.diagnostics;
       return true;
     }
@@ -375,6 +378,7 @@ piko::compileReferenceObject(const ObjectOptions &options,
     return std::nullopt;
   CompiledObject object;
   object.symbol = referenceEntry;
+  object.isFromCache = adapter.isFromCache && host.isFromCache;
   object.pipelines = std::move(adapter.pipelines);
   object.code = std::move(host.code);
   std::set<std::string> all(adapter.files.begin(), adapter.files.end());

@@ -79,6 +79,7 @@ public:
   /// The name of the image that the pipeline makes.
   const std::string &image() const { return output; }
   double compileMilliseconds() const { return program->compileMilliseconds(); }
+  bool isFromCache() const { return program->isFromCache(); }
 
 private:
   std::unique_ptr<LoadedProgram> program; // goes last

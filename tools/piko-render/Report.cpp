@@ -175,6 +175,7 @@ Json render::makeReport(const Options &options, const RunResult &result,
   report["target"] = target;
   report["frames"] = result.times.count;
   report["compile_ms"] = roundToThousandths(result.compileMilliseconds);
+  report["from_cache"] = result.isFromCache ? 1 : 0;
   report["load_ms"] = roundToThousandths(result.loadMilliseconds);
   report["patches"] = result.patches;
   report["counters"] = reportCounts(result.counts);
@@ -216,6 +217,8 @@ std::string render::summarize(const Options &options, const RunResult &result,
                 nameTarget(options, pipeline), where.c_str(),
                 result.compileMilliseconds);
   std::string lines = text;
+  if (result.isFromCache)
+    lines += ", from the cache";
   for (const std::string &image : options.images)
     lines += "\nwrote '" + image + "'";
   return lines;

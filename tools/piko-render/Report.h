@@ -20,7 +20,9 @@ struct FrameTimes {
 
 struct RunResult {
   FrameTimes times;
-  double compileMilliseconds, loadMilliseconds;
+  double compileMilliseconds;
+  bool isFromCache; ///< so that nothing had to be compiled
+  double loadMilliseconds;
   int64_t triangles, vertices, patches;
   int width, height;  ///< of the image, or the domain
   int64_t primitives; ///< of a capture's sources

@@ -84,7 +84,8 @@ bool WasteFinder::fillsPixels(const StageWork &stage) const {
 void WasteFinder::addCalls(const StageWork &stage) {
   double calls = double(stage.calls), least = double(stage.least);
   double primitives = double(stage.primitives);
-  if (primitives > 0 && calls > 1.5 * primitives)
+  // A list is taken once for each bin, however many primitives it holds.
+  if (!stage.takesList && primitives > 0 && calls > 1.5 * primitives)
     add(timeOf(stage) * (1 - primitives / calls),
         stage.name + " is called " + text(calls / primitives) +
             " times for each primitive, once for each of its bins",

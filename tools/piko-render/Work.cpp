@@ -3,6 +3,7 @@
 #include "Work.h"
 
 #include "Piko/CommandLine/Progress.h"
+#include "pikort/abi_setup.h"
 
 #include <algorithm>
 #include <map>
@@ -40,6 +41,9 @@ void Collector::addStages() {
     StageWork added;
     added.name = stats.name;
     added.primitives = stats.in;
+    pikort_stage_info info{};
+    pikort_get_stage_info(pipeline, i, &info);
+    added.takesList = info.flags & PIKOIR_LIST;
     work.stages.push_back(added);
   }
 }

@@ -27,6 +27,7 @@ struct StageWork {
   /// pixels of the picture, or entries of a buffer. No more calls than these
   /// are needed; at most `calls`.
   int64_t least = 0;
+  bool takesList = false; ///< It is called for each bin, not each primitive.
 
   int64_t operations() const { return floats + integers; }
 };

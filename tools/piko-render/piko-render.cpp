@@ -46,6 +46,21 @@ private:
   Clock::time_point start = Clock::now();
 };
 
+/// What went wrong in a run, and how to see where in the text.
+Error errorOfRun(const Options &options, pikort_pipeline *pipeline,
+                 int32_t status) {
+  Error error = errorOf(pipeline);
+  bool hasPlace = status == PIKORT_BIN_OUTSIDE ||
+                  status == PIKORT_UPDATE_OUTSIDE ||
+                  status == PIKORT_INDEX_OUTSIDE ||
+                  status == PIKORT_NO_QUOTIENT || status == PIKORT_NOT_A_NUMBER;
+  if (hasPlace && !options.load.check.enabled &&
+      options.load.target != ExecutionTarget::Reference &&
+      !isPipelineLibrary(options.pipeline))
+    error.message += "\n  --check says at which line, and of which primitive";
+  return error;
+}
+
 /// Runs the warm-up frames, then the timed ones.
 Result<FrameTimes> timeFrames(const Options &options,
                               pikort_pipeline *pipeline) {
@@ -55,8 +70,8 @@ Result<FrameTimes> timeFrames(const Options &options,
   Stopwatch warmup;
   for (int i = 0; i < options.warmup && warmup.milliseconds() < limit / 4;
        ++i) {
-    if (pikort_run(pipeline) != PIKORT_OK)
-      return errorOf(pipeline);
+    if (int32_t status = pikort_run(pipeline); status != PIKORT_OK)
+      return errorOfRun(options, pipeline, status);
     bar.update(i / total);
   }
   pikort_reset_stats(pipeline);
@@ -65,8 +80,8 @@ Result<FrameTimes> timeFrames(const Options &options,
   while (int(times.size()) < options.frames &&
          (times.size() < 3 || spent < limit)) {
     Stopwatch frame;
-    if (pikort_run(pipeline) != PIKORT_OK)
-      return errorOf(pipeline);
+    if (int32_t status = pikort_run(pipeline); status != PIKORT_OK)
+      return errorOfRun(options, pipeline, status);
     times.push_back(frame.milliseconds());
     spent += times.back();
     bar.update((options.warmup + int(times.size())) / total);
@@ -279,6 +294,7 @@ Result<Done> renderScene(Options options) {
 
   RunResult result{*times,
                    frame->compileMilliseconds(),
+                   frame->isFromCache(),
                    loadMilliseconds,
                    int64_t(scene->mesh.triangles.size()),
                    int64_t(scene->mesh.vertices.size()),

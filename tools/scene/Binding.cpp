@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/Scene/Binding.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cstring>
 
@@ -102,6 +103,18 @@ private:
     return record;
   }
 
+  /// "stage 'draw' of 'Lamp'".
+  std::string describeSource(int32_t index) {
+    pikort_source_info source;
+    pikort_stage_info stage;
+    pikort_record_info record;
+    if (pikort_get_source_info(pipeline, index, &source) != PIKORT_OK ||
+        pikort_get_stage_info(pipeline, source.stage, &stage) != PIKORT_OK ||
+        pikort_get_record(pipeline, source.record, &record) != PIKORT_OK)
+      return "source " + std::to_string(index);
+    return "stage '" + std::string(stage.name) + "' of '" + record.name + "'";
+  }
+
   /// Makes what is made only for pipelines that ask for this type. The error is
   /// a scene that has nothing of it.
   Result<Done> prepare(const char *type) {
@@ -181,8 +194,10 @@ private:
                              const std::string &type) {
     if (fed >= 0)
       return fail("expected one source for table '" + scene.table->path +
-                  "', but " + std::to_string(fed) + " and " +
-                  std::to_string(source) + " take what no scene has");
+                  "', but " + describeSource(fed) + " and " +
+                  describeSource(source) +
+                  " take what no scene has; let an application feed both, and "
+                  "render its capture");
     fed = source;
     auto known = scene.records.find(type);
     if (known == scene.records.end()) {
@@ -220,16 +235,23 @@ private:
     return Done{};
   }
 
+  bool isSet(const std::string &constant) const {
+    return std::any_of(scene.values.begin(), scene.values.end(),
+                       [&](const auto &set) { return set.first == constant; });
+  }
+
   Result<Done> bindConstant(const pikort_state_info &state,
                             const pikort_record_info &record) {
     Supply supply = constantFor(record.name);
     if (!supply.size && state.bound) // it has a value of its own
       return Done{};
+    if (!supply.size && isSet(state.name))
+      return Done{}; // by setConstants
     if (!supply.size)
       return fail(unsuitable("constant '" + std::string(state.name) + "'",
                              record.name,
                              "'piko::scene::Camera', '...::Settings', "
-                             "'...::Bounds' or a default value"));
+                             "'...::Bounds', a default value or --set"));
     if (pikort_bind_constant(pipeline, state.name, supply.data, supply.size) !=
         PIKORT_OK)
       return lastError();

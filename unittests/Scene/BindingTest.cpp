@@ -258,7 +258,7 @@ TEST_F(Binding, UnknownConstant) {
               declareState(p, 0, "knob", PIKORT_CONSTANT, OTHER);
             }),
             "pipeline 'Test': constant 'knob': expected 'piko::scene::Camera', "
-            "'...::Settings', '...::Bounds' or a default value, but got "
+            "'...::Settings', '...::Bounds', a default value or --set, but got "
             "'Other'");
 }
 
@@ -355,7 +355,9 @@ TEST_F(Binding, TablesForTwo) {
               declareState(p, 0, "color", PIKORT_IMAGE, COLOR, 2);
             }),
             "pipeline 'Test': expected one source for table 'numbers.csv', but "
-            "0 and 1 take what no scene has");
+            "stage 'stage' of 'Other' and stage 'stage' of 'Other' take what "
+            "no scene has; let an application feed both, and render its "
+            "capture");
 }
 
 TEST_F(Binding, TablesHaveNoCamera) {

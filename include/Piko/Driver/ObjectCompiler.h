@@ -40,6 +40,8 @@ struct CompiledObject {
   std::string header;
   /// The files that were read, sorted.
   std::vector<std::string> files;
+  /// Whether nothing had to be compiled.
+  bool isFromCache = false;
 };
 
 /// Compiles, or finds in the cache what the same text, headers and options gave

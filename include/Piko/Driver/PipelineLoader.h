@@ -54,6 +54,8 @@ public:
   const pikort_program &get() const { return *program; }
   /// From the text to here, in milliseconds.
   double compileMilliseconds() const { return milliseconds; }
+  /// Whether nothing had to be compiled: its code was in the cache.
+  bool isFromCache() const { return fromCache; }
   /// A hash of the code: what has the same runs the same.
   uint64_t codeHash() const { return hash; }
 
@@ -61,6 +63,7 @@ protected:
   const pikort_program *program = nullptr;
   double milliseconds = 0;
   uint64_t hash = 0;
+  bool fromCache = false;
 };
 
 /// Whether a file holds what was compiled ahead of time, by its name.
