@@ -127,9 +127,11 @@ int32_t pikort_set_domain(pikort_pipeline *p, int32_t rank,
       invalid("expected the domain's extents, but got null");
     for (int32_t d = 0; d < rank; ++d)
       if (extent[d] < 1 || extent[d] > PIKORT_MAX_EXTENT)
-        invalid("expected domain extents in [1, " +
+        invalid("pipeline " + quoted(p->name) +
+                ": expected domain extents in [1, " +
                 std::to_string(PIKORT_MAX_EXTENT) + "], but got " +
-                std::to_string(extent[d]));
+                std::to_string(extent[d]) + " in dimension " +
+                std::to_string(d));
     std::array<int64_t, 4> domain{1, 1, 1, 1};
     std::copy_n(extent, rank, domain.begin());
     change(p, [=] { p->domain = domain; });

@@ -346,8 +346,28 @@ static std::string describeCell(int64_t low, int64_t high, int32_t rank) {
   return text + ")";
 }
 
+/// "; the bin has (0, 0) to (15, 15)"; nothing where the stage is not known.
+static std::string describeBin(const Stage *stage, int64_t bin,
+                               const std::array<int64_t, 4> &domain,
+                               int32_t rank) {
+  if (!stage || bin < 0 || bin >= stage->bins())
+    return "";
+  std::string first = "(", last = "(";
+  for (int32_t d = 0; d < rank; ++d) {
+    int64_t size = stage->binSize[d] ? stage->binSize[d] : domain[d];
+    int64_t count = (domain[d] + size - 1) / size;
+    int64_t lo = bin % count * size;
+    bin /= count;
+    first += (d ? ", " : "") + std::to_string(lo);
+    last +=
+        (d ? ", " : "") + std::to_string(std::min(lo + size, domain[d]) - 1);
+  }
+  return "; the bin has " + first + ") to " + last + ")";
+}
+
 static std::string describe(const std::string &stage, const KernelError &e,
                             int32_t rank, const State *state,
+                            const std::string &bin,
                             const std::string &memoryLimit) {
   std::string a = std::to_string(e.a), b = std::to_string(e.b);
   std::string text = "stage " + quoted(stage);
@@ -359,12 +379,15 @@ static std::string describe(const std::string &stage, const KernelError &e,
     text += "expected a bin id";
     if (e.b > 0)
       text += " in [0, " + b + ")";
-    return text + ", but got " + a;
+    text += ", but got " + a;
+    if (e.a == -1)
+      text += ", which binFromPosition gives outside of the domain";
+    return text;
   case PIKORT_UPDATE_OUTSIDE:
     return text +
            "expected an update inside the stage's own bin, but got "
            "pixel " +
-           describeCell(e.a, e.b, rank);
+           describeCell(e.a, e.b, rank) + bin;
   case PIKORT_INDEX_OUTSIDE:
     return text + "expected an index " +
            (state ? "into " + quoted(state->name) + " " : "") + "in [0, " + b +
@@ -401,12 +424,12 @@ void pikort_pipeline::settleReported() noexcept {
       Stage *stage = findStage(error.stage);
       bool hasState =
           error.state >= 0 && error.state < static_cast<int32_t>(states.size());
-      std::string text =
-          describe(!error.name.empty() ? std::string(error.name)
-                   : stage             ? stage->name
-                                       : std::to_string(error.stage),
-                   error, rank, hasState ? &states[error.state] : nullptr,
-                   memoryLimitText(*this));
+      std::string text = describe(
+          !error.name.empty() ? std::string(error.name)
+          : stage             ? stage->name
+                              : std::to_string(error.stage),
+          error, rank, hasState ? &states[error.state] : nullptr,
+          describeBin(stage, error.bin, domain, rank), memoryLimitText(*this));
       fail(error.code, executor->describe(error.code, text));
     } catch (...) {
       fail(error.code, {});

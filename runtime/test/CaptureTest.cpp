@@ -127,8 +127,10 @@ TEST_F(Captures, SayWhatDoesNotFit) {
             "0 of another type");
   EXPECT_EQ(bind([](Capture &c) { c.sources[0].layout.size = 12; }),
             "source 0: expected records of 8 bytes, but the capture has 12");
-  EXPECT_EQ(bind([](Capture &c) { c.domain[1] = 0; }),
-            "expected domain extents in [1, 1073741824], but got 0");
+  EXPECT_EQ(
+      bind([](Capture &c) { c.domain[1] = 0; }),
+      "pipeline 'Particles': expected domain extents in [1, 1073741824], but "
+      "got 0 in dimension 1");
 }
 
 TEST_F(Captures, NeedARunThatCouldBe) {

@@ -255,8 +255,9 @@ TEST_F(Host, BadDomains) {
   for (int64_t extent :
        {int64_t(0), int64_t(-3), int64_t(PIKORT_MAX_EXTENT) + 1})
     expectError(pipe.domain({extent, 8}), PIKORT_INVALID_ARGUMENT,
-                "expected domain extents in [1, 1073741824], but got " +
-                    std::to_string(extent));
+                "pipeline 'Small': expected domain extents in [1, 1073741824], "
+                "but got " +
+                    std::to_string(extent) + " in dimension 0");
   expectError(pipe.domain({8}), PIKORT_INVALID_ARGUMENT,
               "pipeline 'Small': expected a domain of rank 2, but got 1");
   bindAll();
@@ -353,7 +354,7 @@ TEST_F(Host, BinsOutsideTheGrid) {
     act = Act::NegativeBin;
     expectError(pipe.run(), PIKORT_BIN_OUTSIDE,
                 "stage 'bin': expected a bin id in [0, 4), but got "
-                "-1");
+                "-1, which binFromPosition gives outside of the domain");
   }
   act = Act::Nothing;
   EXPECT_TRUE(pipe.run());

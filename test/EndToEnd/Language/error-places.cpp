@@ -57,7 +57,7 @@ struct StoreOutside : Binned {
 };
 struct Store : One<StoreOutside> {};
 
-// UPDATE: expected: {{.*}}stage 'UpdateOutside'[[WHERE:, bin 5: expected an update inside the stage's own bin, but got pixel \(1, 2\)]]{{$}}
+// UPDATE: expected: {{.*}}stage 'UpdateOutside'[[WHERE:, bin 5: expected an update inside the stage's own bin, but got pixel \(1, 2\); the bin has \([0-9, ]+\) to \([0-9, ]+\)]]{{$}}
 // UPDATE: got: stage 'only'[[WHERE]]{{$}}
 struct UpdateOutside : Binned {
   void process(const Point &) {

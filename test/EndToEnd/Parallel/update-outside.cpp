@@ -6,12 +6,12 @@
 // RUN: %compare_targets %s --stops --pipe One --domain 16 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=ONE
 // RUN: %compare_targets %s --stops --pipe Three --domain 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=THREE
 // RUN: %compare_targets %s --stops --pipe Four --domain 8 8 8 8 --runs 1 --threads 1 2 --count 1 | FileCheck %s --check-prefix=FOUR
-// ONE: expected: {{.*}} inside the stage's own bin, but got pixel (9)
-// ONE: got: {{.*}} inside the stage's own bin, but got pixel (9)
-// THREE: expected: {{.*}} inside the stage's own bin, but got pixel (1, -2, 6)
-// THREE: got: {{.*}} inside the stage's own bin, but got pixel (1, -2, 6)
-// FOUR: expected: {{.*}} inside the stage's own bin, but got pixel (1, 2, 3, 7)
-// FOUR: got: {{.*}} inside the stage's own bin, but got pixel (1, 2, 3, 7)
+// ONE: expected: {{.*}} inside the stage's own bin, but got pixel (9); the bin has (0) to (3)
+// ONE: got: {{.*}} inside the stage's own bin, but got pixel (9); the bin has (0) to (3)
+// THREE: expected: {{.*}} inside the stage's own bin, but got pixel (1, -2, 6); the bin has (0, 0, 0) to (3, 3, 3)
+// THREE: got: {{.*}} inside the stage's own bin, but got pixel (1, -2, 6); the bin has (0, 0, 0) to (3, 3, 3)
+// FOUR: expected: {{.*}} inside the stage's own bin, but got pixel (1, 2, 3, 7); the bin has (0, 0, 0, 0) to (3, 3, 3, 3)
+// FOUR: got: {{.*}} inside the stage's own bin, but got pixel (1, 2, 3, 7); the bin has (0, 0, 0, 0) to (3, 3, 3, 3)
 #include <piko.h>
 
 struct Point {

@@ -129,6 +129,13 @@ inline void assignLine(const Cell &a, const Cell &b, int rank,
               });
 }
 
+/// The last cell before one that is past it in each dimension.
+inline Cell lastOf(Cell end) {
+  for (int64_t &at : end)
+    --at;
+  return end;
+}
+
 inline void checkOwnPixel(const CallFrame &call, const Cell &at, int rank) {
   Cell lo = call.node->grid.lo(call.bin);
   Cell hi = call.node->grid.hi(call.bin);
@@ -137,7 +144,8 @@ inline void checkOwnPixel(const CallFrame &call, const Cell &at, int rank) {
       call.node->fail(call.bin,
                       "expected an update inside the stage's own bin, but "
                       "got pixel " +
-                          toText(at, rank));
+                          toText(at, rank) + "; the bin has " +
+                          toText(lo, rank) + " to " + toText(lastOf(hi), rank));
 }
 
 /// Positions that are floats name the cells of a domain that is not too large.

@@ -144,8 +144,12 @@ public:
     CallFrame &call = expect(Phase::Assign, "an assign directive");
     int64_t bins = call.node->grid.bins();
     if (bin < 0 || bin >= bins)
-      call.node->fail(-1, "expected a bin id in [0, " + std::to_string(bins) +
-                              "), but got " + std::to_string(bin));
+      call.node->fail(
+          -1,
+          "expected a bin id in [0, " + std::to_string(bins) + "), but got " +
+              std::to_string(bin) +
+              (bin == -1 ? ", which binFromPosition gives outside of the domain"
+                         : ""));
     call.assigned->push_back(bin);
   }
 
