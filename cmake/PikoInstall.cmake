@@ -32,10 +32,24 @@ install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentati
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation
   REGEX "examples/[a-z]+/CMakeLists.txt$" EXCLUDE
   REGEX "examples/CMakeLists.txt$" EXCLUDE)
-install(FILES README.md CHANGELOG.md SECURITY.md CITATION.cff
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md CITATION.cff
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
+install(DIRECTORY benchmarks/results DESTINATION ${CMAKE_INSTALL_DOCDIR}/benchmarks
+  COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN speed-error EXCLUDE)
+install(FILES benchmarks/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/benchmarks
+  COMPONENT documentation)
 # A Debian package has it in its own form.
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)
+# Links of documents to what only the tree has become text.
+find_package(Python3 COMPONENTS Interpreter)
+if(Python3_Interpreter_FOUND)
+  file(RELATIVE_PATH headers /prefix/${CMAKE_INSTALL_DOCDIR} /prefix/${CMAKE_INSTALL_INCLUDEDIR})
+  install(CODE "execute_process(COMMAND \"${Python3_EXECUTABLE}\"
+    \"${PROJECT_SOURCE_DIR}/utils/install-documents.py\"
+    --source \"${PROJECT_SOURCE_DIR}\" --include \"${headers}\"
+    \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
+    COMMAND_ERROR_IS_FATAL ANY)" COMPONENT documentation)
+endif()
 
 if(PIKO_ENABLE_COMPILER)
   list(APPEND PIKO_COMPONENTS tools compiler)
@@ -57,7 +71,6 @@ if(PIKO_ENABLE_COMPILER)
     list(APPEND modules PikoImage)
   endif()
   # From the tables of options that the tools have.
-  find_package(Python3 COMPONENTS Interpreter)
   if(Python3_Interpreter_FOUND)
     set(manuals ${PROJECT_BINARY_DIR}/manuals)
     set(make_manuals ${PROJECT_SOURCE_DIR}/utils/make-manuals.py)

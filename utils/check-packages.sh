@@ -44,7 +44,7 @@ open_root
 rm -rf "$root/checked"
 mkdir "$root/checked" "$root/checked/packages"
 cp "${packages[@]}" "$root/checked/packages"
-cp "$source/utils/check-tutorial.py" "$root/checked"
+cp "$source"/utils/{check-tutorial,install-documents,document_links}.py "$root/checked"
 readonly install='env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends'
 readonly doc=/usr/share/doc/piko
 
@@ -57,6 +57,7 @@ step 'every library is found' \
 step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev mlir-22-tools \
   glmark2-data man-db bash-completion zsh lintian"
 
+step 'documents lead to what is installed' "python3 install-documents.py --check $doc"
 step 'an application, as the tutorial makes it' \
   "python3 check-tutorial.py --piko /usr --work tutorial $doc/docs/Tutorial.md"
 step 'a pass out of tree' \

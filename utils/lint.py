@@ -29,6 +29,8 @@ import subprocess
 import sys
 import tempfile
 
+from document_links import find_dead
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LLVM_BIN = "/usr/lib/llvm-22/bin"
 CXX = {".h", ".c", ".cpp", ".inc"}
@@ -205,40 +207,12 @@ def classes():
     return faults
 
 
-LINK = re.compile(r"\]\(([^)\s]+)\)|(?:src|href)=\"([^\"]+)\"")
-FENCED = re.compile(r"^ *```.*?^ *```", re.S | re.M)
-
-
-def anchors(text):
-    """What links within a document can name, as GitHub makes it of headings."""
-    found = set(re.findall(r"<a (?:id|name)=\"([^\"]+)\"", text))
-    for heading in re.findall(r"^#+ (.+)$", FENCED.sub("", text), re.M):
-        heading = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)
-        name = re.sub(r"[^\w\- ]", "", heading.lower().strip()).replace(" ", "-")
-        number = 0
-        while (unique := f"{name}-{number}" if number else name) in found:
-            number += 1
-        found.add(unique)
-    return found
-
-
 def links():
-    faults, known = 0, {}
-    for name in sources():
-        if not name.endswith(".md"):
-            continue
-        text = (ROOT / name).read_text()
-        for link in LINK.finditer(FENCED.sub("", text)):
-            target = link[1] or link[2]
-            if re.match(r"\w+:", target):
-                continue
-            file, _, anchor = target.partition("#")
-            path = (ROOT / name).parent / file if file else ROOT / name
-            if path.suffix == ".md" and path.is_file() and path not in known:
-                known[path] = anchors(path.read_text())
-            if not path.exists() or anchor and anchor not in known.get(path, ()):
-                print(f"{name}: nothing is where '{target}' leads to")
-                faults += 1
+    pages = [ROOT / name for name in sources() if name.endswith(".md")]
+    faults = 0
+    for page, target in find_dead(pages):
+        print(f"{page.relative_to(ROOT)}: nothing is where '{target}' leads to")
+        faults += 1
     return faults
 
 
