@@ -13,8 +13,10 @@ cmake_policy(VERSION 3.20...3.25)
 #
 # CPU      the processor to compile for: as clang names them, or native
 #          (x86-64-v3); of several the last runs that fits the machine
-# TUNED    what piko-tune chose for the pipeline, of which there is one then
-# OPTIONS  further options of pikoc, such as -I<folder> and -D<name>
+# TUNED    what piko-tune chose for the pipeline, of which there is one then;
+#          relative to the folder of the source, as SOURCES
+# OPTIONS  further options of pikoc, such as -I<folder> and -D<name>; it runs in
+#          the build folder, so paths are absolute
 function(piko_add_pipeline target)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "CPU;TUNED" "SOURCES;PIPES;OPTIONS")
   if(ARG_UNPARSED_ARGUMENTS)

@@ -4,9 +4,12 @@
 
 #include "Piko/Driver/TunedSetting.h"
 
+#include "llvm/ADT/SmallString.h"
+#include "llvm/Support/FileSystem.h"
 #include "llvm/Support/Format.h"
 #include "llvm/Support/JSON.h"
 #include "llvm/Support/MemoryBuffer.h"
+#include "llvm/Support/Path.h"
 #include "llvm/Support/raw_ostream.h"
 
 using namespace piko;
@@ -152,6 +155,14 @@ static std::string describeParseError(llvm::Error error) {
       .str();
 }
 
+/// Where a relative path was looked for.
+static std::string describeFolder(const std::string &path) {
+  llvm::SmallString<128> folder;
+  if (llvm::sys::path::is_absolute(path) || llvm::sys::fs::current_path(folder))
+    return "";
+  return (" in folder '" + folder + "'").str();
+}
+
 std::optional<TunedSetting> piko::readTunedSetting(const std::string &path,
                                                    std::string &error) {
   auto fail = [&](const std::string &why) {
@@ -160,7 +171,7 @@ std::optional<TunedSetting> piko::readTunedSetting(const std::string &path,
   };
   auto buffer = llvm::MemoryBuffer::getFile(path);
   if (!buffer)
-    return fail(buffer.getError().message());
+    return fail(buffer.getError().message() + describeFolder(path));
   llvm::Expected<json::Value> value = json::parse((*buffer)->getBuffer());
   if (!value)
     return fail(describeParseError(value.takeError()));
