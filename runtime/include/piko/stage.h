@@ -20,6 +20,7 @@
 #define PIKO_STAGE_H
 
 #include <piko/update.h>
+#include <piko/wide_line.h>
 
 #ifdef __PIKO__
 #include <piko/compiled/stage.h>
@@ -47,6 +48,19 @@ bool areNumbers(const Position<Rank> &a, const Position<Rank> &b) {
   for (int dim = 0; dim < Rank; ++dim)
     isNumber = isNumber && a[dim] == a[dim] && b[dim] == b[dim];
   return isNumber;
+}
+
+/// Of positions or cells.
+template <class B, class Ends>
+void assignWideLine(const Place &at, const Ends &a, const Ends &b,
+                    float width) {
+  if (width != width)
+    return call::assignNaN(at);
+  WideLine<B::rank>(a, b, width)
+      .template forEachBin<B>(
+          call::domain<B::rank>(at), [&](const Cells<B::rank> &cell) {
+            call::assignBin(at, call::binAt<B::rank>(at, cell));
+          });
 }
 
 } // namespace detail
@@ -141,6 +155,22 @@ public:
       detail::call::assignNaN(at);
   }
 
+  /// To all bins that come as near as half of the width to the segment from a
+  /// to b, in each dimension: of cells from middle to middle.
+  void assignToLine(const In &, const Cells<B::rank> &a,
+                    const Cells<B::rank> &b, float width,
+                    detail::Place at = detail::Place::current()) {
+    detail::assignWideLine<B>(at, a, b, width);
+  }
+  void assignToLine(const In &, const Position<B::rank> &a,
+                    const Position<B::rank> &b, float width,
+                    detail::Place at = detail::Place::current()) {
+    if (detail::areNumbers<B::rank>(a, b))
+      detail::assignWideLine<B>(at, a, b, width);
+    else
+      detail::call::assignNaN(at);
+  }
+
   // Positions and cells as braced lists of numbers.
 
   template <class T>
@@ -159,6 +189,11 @@ public:
                     detail::Place at = detail::Place::current()) {
     assignToLine(in, detail::pointOf(a), detail::pointOf(b), at);
   }
+  template <class T>
+  void assignToLine(const In &in, const T (&a)[B::rank], const T (&b)[B::rank],
+                    float width, detail::Place at = detail::Place::current()) {
+    assignToLine(in, detail::pointOf(a), detail::pointOf(b), width, at);
+  }
   // If they are of several types: floats.
   BinId binFromPosition(const float (&at)[B::rank],
                         detail::Place place = detail::Place::current()) const {
@@ -173,6 +208,11 @@ public:
                     const float (&b)[B::rank],
                     detail::Place at = detail::Place::current()) {
     assignToLine(in, detail::pointOf(a), detail::pointOf(b), at);
+  }
+  void assignToLine(const In &in, const float (&a)[B::rank],
+                    const float (&b)[B::rank], float width,
+                    detail::Place at = detail::Place::current()) {
+    assignToLine(in, detail::pointOf(a), detail::pointOf(b), width, at);
   }
   // Those of another number of dimensions are no positions.
   template <int Rank, class T>
