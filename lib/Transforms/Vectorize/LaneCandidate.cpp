@@ -118,7 +118,7 @@ static std::string describeAccessed(Operation *op) {
 }
 
 /// Whether lanes come to an operation only where a vote has failed.
-static bool isFallback(Operation *op) {
+static bool standsAfterVote(Operation *op) {
   for (Region *region = op->getParentRegion(); region;
        region = region->getParentRegion()) {
     auto choice = dyn_cast<scf::IfOp>(region->getParentOp());
@@ -143,7 +143,7 @@ static void addGathers(InFlightDiagnostic &remark, const IterationLanes &lanes,
   llvm::MapVector<Location, Line> lines;
   for (auto [part, op] : cost.obstacles)
     if (lanes.getForm(op) == LaneForm::Access && !isa<GetOp, ItemOp>(op) &&
-        !isFallback(op)) {
+        !standsAfterVote(op)) {
       Line &line = lines[op->getLoc()];
       line.cycles += part;
       line.first = op;
