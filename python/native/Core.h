@@ -52,6 +52,7 @@ void finishJobs();
 void forgetJobs();
 
 void defineCompiler(py::module_ &module);
+void defineErrors(py::module_ &module);
 void definePipeline(py::module_ &module);
 void defineTensor(py::module_ &module);
 

@@ -10,6 +10,7 @@ PYBIND11_MODULE(_core, module) {
              py::call_guard<py::gil_scoped_release>());
   module.def("forget_jobs", forgetJobs);
   defineCompiler(module);
+  defineErrors(module);
   definePipeline(module);
   defineTensor(module);
 }

@@ -27,6 +27,14 @@ from ._compare import Comparison, Difference, compare
 from ._compile import LEVELS, Object, Program, Tunable, compile, pipelines
 from ._errors import CompileError, CompileWarning, Diagnostic, Error, RunError, Status
 from ._pipeline import PROCESSOR, Array, Device, Pipeline, SourceInfo, devices
+from ._speed_error import (
+    Errors,
+    SpeedError,
+    SpeedErrorPoint,
+    VariantError,
+    pareto_front,
+    speed_error,
+)
 from ._stats import KernelStats, Mapping, StageStats, Stats
 from ._tune import TuneError, Tuned, tune
 
@@ -45,16 +53,21 @@ __all__ = [
     "Diagnostic",
     "Difference",
     "Error",
+    "Errors",
     "KernelStats",
     "LEVELS",
     "Mapping",
     "Object",
+    "pareto_front",
     "Pipeline",
     "pipelines",
     "PROCESSOR",
     "Program",
     "RunError",
     "SourceInfo",
+    "speed_error",
+    "SpeedError",
+    "SpeedErrorPoint",
     "StageStats",
     "Stats",
     "Status",
@@ -62,4 +75,5 @@ __all__ = [
     "tune",
     "Tuned",
     "TuneError",
+    "VariantError",
 ]

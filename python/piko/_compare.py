@@ -111,18 +111,24 @@ def _compare_numbers(
     )
 
 
-def _run_copy(pipe: Pipeline, other: Pipeline) -> Optional[str]:
-    """Runs another pipeline on copies of what one has; how that failed."""
-    other.domain = pipe.domain
+def bind_copy(pipe: Pipeline, other: Pipeline) -> None:
+    """Gives another pipeline copies of what one has."""
+    if pipe.domain:
+        other.domain = pipe.domain
     for name, state in pipe._states.items():
         if state.kind == "constant":
             other._set_constant(other._find(name), pipe[name])
-        elif state.kind == "buffer" and state.source < 0 and _has_memory(pipe, name):
+        elif state.kind == "buffer" and state.source < 0 and has_memory(pipe, name):
             other[name] = np.array(pipe.read(name))
     for index, bound in pipe._fed.items():
         if bound.on_device:
             raise ValueError("expected sources in the host's memory to compare with")
         other.feed(index, bound.array)
+
+
+def _run_copy(pipe: Pipeline, other: Pipeline) -> Optional[str]:
+    """Runs another pipeline on copies of what one has; how that failed."""
+    bind_copy(pipe, other)
     try:
         other.run()
     except RunError as error:
@@ -130,7 +136,7 @@ def _run_copy(pipe: Pipeline, other: Pipeline) -> Optional[str]:
     return None
 
 
-def _has_memory(pipe: Pipeline, name: str) -> bool:
+def has_memory(pipe: Pipeline, name: str) -> bool:
     """Whether a buffer is bound; what no kernel uses need not be."""
     bound = {one[0]: one[5] for one in pipe._core.states()}
     return bound[name]
@@ -157,7 +163,7 @@ def compare(
     differences: List[Difference] = []
     if expected_error is None and actual_error is None:
         for name, state in pipe._states.items():
-            if state.kind == "constant" or not _has_memory(second, name):
+            if state.kind == "constant" or not has_memory(second, name):
                 continue
             rank = state.rank
             expected, actual = first.read(name), second.read(name)

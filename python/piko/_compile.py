@@ -310,6 +310,44 @@ def compile(
     is wrong. Warnings of the compiler are CompileWarnings. Ctrl-C raises
     KeyboardInterrupt at once; the compiler then ends in the background.
     """
+    return Program(_read_options(**locals()))
+
+
+# The options of compile, as the compiler names them.
+_SETTINGS = {
+    "tunables": "tunable",
+    "defines": "define",
+    "include_dirs": "include-dir",
+    "opt_level": "opt-level",
+    "directives": "directive",
+    "gpu_threads": "gpu-threads",
+    "gpu_chip": "gpu-chip",
+    "cache_dir": "cache-dir",
+}
+
+
+def _read_options(
+    source: Source,
+    pipe: Optional[str] = None,
+    *,
+    target: str = "cpu",
+    tunables: Optional[Mapping[str, object]] = None,
+    tuned: Optional[Source] = None,
+    fix: Optional[Mapping[str, object]] = None,
+    defines: Macros = (),
+    include_dirs: Iterable[Source] = (),
+    cpu: Optional[str] = "native",
+    opt_level: int = 3,
+    check: Union[bool, Iterable[str]] = False,
+    without: Iterable[str] = (),
+    directives: Iterable[str] = (),
+    gpu_threads: int = 0,
+    gpu_chip: Optional[str] = None,
+    cache: bool = True,
+    cache_dir: Optional[Source] = None,
+    name: Optional[str] = None,
+) -> _Options:
+    """The arguments of compile, checked, as the compiler takes them."""
     settings = _Settings()
     settings.add("pipe", pipe)
     settings.add("target", target)
@@ -330,7 +368,16 @@ def compile(
     settings.add("gpu-chip", gpu_chip)
     settings.add("cache", None if cache else "off")
     settings.add("cache-dir", None if cache_dir is None else os.fspath(cache_dir))
-    return Program(settings.of(source, name))
+    return settings.of(source, name)
+
+
+def change_options(options: _Options, changed: Mapping[str, Any]) -> _Options:
+    """The same with some arguments of compile in the place of what they said."""
+    read = _read_options(options.source, **changed)
+    keys = {_SETTINGS.get(one, one) for one in changed}
+    kept = [one for one in options.settings if one[0] not in keys]
+    kept += [one for one in read.settings if one[0] in keys]
+    return _Options(options.source, options.is_text, options.name, tuple(kept))
 
 
 def pipelines(

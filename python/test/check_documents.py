@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 """The manual's blocks run, in their order, and so do the example and the notebook."""
 
+import csv
 import re
 import subprocess
 import sys
@@ -74,6 +75,21 @@ class Documents(unittest.TestCase):
         middle, corner = (pixels[i:i + 3] for i in at)
         self.assertEqual(corner, b"\x1a\x1a\x1a")
         self.assertGreater(min(middle), 0x40)
+
+    def test_tradeoff(self):
+        """Precision costs last bits, a quarter of the steps the picture."""
+        lesson = ROOT / "examples" / "lessons" / "10-numbers"
+        with tempfile.TemporaryDirectory() as folder:
+            out = self.run_program(ROOT / "examples" / "python" / "tradeoff.py",
+                                   lesson / "numbers.piko.cpp", lesson / "julia.csv",
+                                   "points.csv", folder=folder)
+            with open(Path(folder) / "points.csv", newline="") as file:
+                rows = {row["variant"]: row for row in csv.DictReader(file)}
+        self.assertRegex(out, r"(?m)^Strict +\d+\.\d{3} ms, rms 0, FLIP 0")
+        self.assertEqual(len(rows), 5)
+        self.assertLess(float(rows["Contracted"]["rms"]), 0.05)
+        self.assertGreater(float(rows["24 steps"]["rms"]), 0.2)
+        self.assertIn("1", [row["front"] for row in rows.values()])
 
     def test_notebook(self):
         notebook = ROOT / "examples" / "python" / "bubbles.ipynb"
