@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""Makes a wheel of the Python module from a build: extension, libpiko, libpikort, the
-runtime's headers and GLM's, with no path of the build in it. LLVM's libraries, Clang's
-and C++'s headers are those of Debian's packages; docs/Python.md lists them.
+"""Makes a wheel of the Python module from a build: extension, libpiko, libpikort,
+piko-tune, the runtime's headers and GLM's, with no path of the build in it. LLVM's
+libraries, Clang's and C++'s headers are those of Debian's packages; docs/Python.md lists
+them.
 
 The same build gives the same bytes. --check installs it into a new venv, without an
-index, and runs the example there.
+index, runs the example there, and tunes a pipeline.
 """
 
 import argparse
@@ -34,6 +35,7 @@ Description-Content-Type: text/markdown
 Pipelines in C++ with piko.h become parallel programs for CPUs and NVIDIA GPUs, and run
 on NumPy arrays. Needs LLVM 22's libraries and what C++ needs to be compiled: on Debian
 libmlir-22, libclang-cpp22, libclang-common-22-dev, libomp5-22 and libstdc++-12-dev.
+piko.tune also needs libmimalloc2.0 and libpng16-16.
 """
 
 
@@ -101,7 +103,8 @@ def write(folder, info, wheel):
             data = (folder / name).read_bytes()
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest())
             record += f"{name},sha256={digest.decode().rstrip('=')},{len(data)}\n"
-            add(name, data, 0o755 if name.endswith(".so") else 0o644)
+            runs = name.endswith(".so") or name.startswith("piko/bin/")
+            add(name, data, 0o755 if runs else 0o644)
         name = f"{info.name}/RECORD"
         add(name, f"{record}{name},,\n", 0o644)
 
@@ -114,9 +117,9 @@ def make(build, out):
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         info = stage(build, folder, tag)
-        for library in folder.rglob("*.so*"):
-            if str(build.resolve()).encode() in read_paths(library):
-                sys.exit(f"make-wheel: {library.name} looks for libraries in the build")
+        for file in (*folder.rglob("*.so*"), *(folder / "piko" / "bin").iterdir()):
+            if str(build.resolve()).encode() in read_paths(file):
+                sys.exit(f"make-wheel: {file.name} looks for libraries in the build")
         wheel = out / f"{info.name.removesuffix('.dist-info')}-{tag}.whl"
         write(folder, info, wheel)
     return wheel
@@ -143,6 +146,34 @@ with open("/proc/self/maps") as maps:
 assert len(ours) == 2 and all(one.startswith(prefix) for one in ours), ours
 """
 
+# Of two settings the one that does a thousandth of the work, by the wheel's own tool.
+TUNE = """
+import os, sys
+import numpy as np
+import piko
+from piko._tune import _find_tool
+prefix = os.path.realpath(sys.prefix)
+assert os.path.realpath(_find_tool()).startswith(prefix), _find_tool()
+pipe = piko.Pipeline("two.piko.cpp", domain=(1, 1), sums=np.zeros(2000, "f4"), threads=1)
+pipe.feed("add", np.arange(2000, dtype="i4"))
+found = piko.tune(pipe, space=["tunables"], budget=40, clock="cpu")
+assert found.tunables == {"steps": 1}, found
+"""
+
+TWO = """#include <piko.h>
+constexpr int steps = piko::tunable("steps", 4000, 1);
+struct State { piko::Buffer<float> sums; };
+struct Add : piko::Stage<0, 0, 64, int>, piko::Uses<State> {
+  void process(const int &i) {
+    float sum = float(i);
+    for (int k = 0; k < steps; ++k)
+      sum = piko::sqrt(sum * sum);
+    state().sums[i] = piko::floor(sum + 0.5f);
+  }
+};
+struct Two : piko::Pipe<State> { Add add; Two() { source(add); } };
+"""
+
 ONE = """#include <piko.h>
 struct Drain : piko::Stage<0, 0, 64, glm::vec2> { void process(const glm::vec2 &) {} };
 struct One : piko::Pipe<> { Drain drain; One() { source(drain); } };
@@ -163,6 +194,8 @@ def check(wheel):
         run(python, *install, wheel.resolve(), **options)
         (folder / "one.piko.cpp").write_text(ONE)
         run(python, "-c", CHECK, **options)
+        (folder / "two.piko.cpp").write_text(TWO)
+        run(python, "-c", TUNE, **options)
         tour = shutil.copy(ROOT / "examples" / "python" / "tour.py", folder)
         out = run(python, tour, "dots.ppm", capture_output=True, **options).stdout
         assert "cpu against gpu-on-cpu: equal" in out, out

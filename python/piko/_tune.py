@@ -25,6 +25,8 @@ _OPTIONS = {
     "cpu": "--cpu",
     "cache-dir": "--cache-dir",
 }
+# The exit status of a program some library of which is missing.
+_NOT_LOADED = 127
 
 
 class TuneError(Error):
@@ -62,10 +64,10 @@ class Tuned:
 
 
 def _find_tool() -> str:
-    """Beside the libraries, or on PATH."""
+    """A wheel's own, beside the libraries, or on PATH."""
     package = Path(__file__).resolve().parent
     # PREFIX/lib/python3/dist-packages/piko, or BUILD/python/piko
-    for up in package.parents[:4]:
+    for up in (package, *package.parents[:4]):
         if (up / "bin" / "piko-tune").exists():
             return str(up / "bin" / "piko-tune")
     found = shutil.which("piko-tune")
@@ -127,7 +129,10 @@ def tune(
             command += ["--space", ",".join(space)]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
-            raise TuneError(done.stderr.strip() or "piko-tune has failed", done.stderr)
+            said = done.stderr.strip() or f"piko-tune ended with {done.returncode}"
+            if done.returncode == _NOT_LOADED:
+                said += " (on Debian, packages libmimalloc2.0 and libpng16-16)"
+            raise TuneError(said, done.stderr)
         text = Path(out).read_text()
         kept = _keep(text)
         return _read(text, json.loads(done.stdout.splitlines()[-1]), kept)

@@ -101,6 +101,12 @@ class Tune(unittest.TestCase):
         self.assertIn("expected max, mean, rms", str(caught.exception))
         with self.assertRaisesRegex(piko.TuneError, "cannot run piko-tune"):
             piko.tune(self.make(), tool="/nonexistent/piko-tune")
+        with tempfile.TemporaryDirectory() as folder:
+            tool = Path(folder) / "piko-tune"
+            tool.write_text("#!/bin/sh\necho no such library >&2\nexit 127\n")
+            tool.chmod(0o755)
+            with self.assertRaisesRegex(piko.TuneError, r"no such library \(on Debian"):
+                piko.tune(self.make(), tool=tool)
         pipe = piko.Pipeline(ROOTS, tunables={"steps": 4})
         with self.assertRaisesRegex(ValueError, "takes no program with tunable"):
             pipe.domain = (1, 1)
