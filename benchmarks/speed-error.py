@@ -21,6 +21,7 @@ import sys
 
 from charts import find_pyplot
 from outputs import write_csv
+from progress import Progress
 from speed_error import draw, failures, page, summary
 from speed_error.choices import CHOICES
 from speed_error.measure import Measurer, Scene
@@ -109,6 +110,34 @@ def describe_machine():
             "that does nothing else."]
 
 
+def measure_all(options, measurer, pyplot, bar):
+    """(choice, points, price) for each choice that there is a scene for."""
+    plan = []
+    for choice in filter(measurer.can_measure, options.choices):
+        scenes = [scene for scene in options.scenes
+                  if scene.is_patches() == choice.patches]
+        if not scenes:
+            print(f"{choice.name}: no scene of this kind", file=sys.stderr)
+        plan += [(choice, scenes)] if scenes else []
+    steps = sum(len(scenes) * measurer.count_steps(choice)
+                for choice, scenes in plan)
+    measurer.advance = lambda: bar.update(measurer.steps / steps)
+    measured = []
+    for choice, scenes in plan:
+        points = [point for scene in scenes
+                  for point in measurer.measure(choice, scene)]
+        for p in points:
+            spread = (max(p.times) - min(p.times)) / statistics.median(p.times)
+            bar.say(f"{choice.name:15} {p.scene:12} {p.setting:15} {p.ms:8.3f} ms "
+                    f"(spread {spread:.0%})  rms {p.errors['rms']:.3g}  FLIP "
+                    f"{p.errors['flip']:.3g}{'  front' if p.front else ''}")
+        measured.append((choice, points, describe_price(choice, points)))
+        if pyplot:
+            draw.write(pyplot, draw.draw_choice(pyplot, choice, points),
+                       f"{options.out}/{choice.name}")
+    return measured
+
+
 def main():
     options = parse_options()
     if options.list:
@@ -116,30 +145,15 @@ def main():
     notes = describe_machine()
     measurer = Measurer(options, ROOT)
     pyplot = find_pyplot()
-    measured = []
-    for choice in filter(measurer.can_measure, options.choices):
-        points = []
-        for scene in options.scenes:
-            if scene.is_patches() == choice.patches:
-                points += measurer.measure(choice, scene)
-        if not points:
-            print(f"{choice.name}: no scene of this kind", file=sys.stderr)
-            continue
-        for p in points:
-            spread = (max(p.times) - min(p.times)) / statistics.median(p.times)
-            print(f"{choice.name:15} {p.scene:12} {p.setting:15} {p.ms:8.3f} ms "
-                  f"(spread {spread:.0%})  rms {p.errors['rms']:.3g}  FLIP "
-                  f"{p.errors['flip']:.3g}{'  front' if p.front else ''}",
-                  flush=True)
-        measured.append((choice, points, describe_price(choice, points)))
-        if pyplot:
-            draw.write(pyplot, draw.draw_choice(pyplot, choice, points),
-                       f"{options.out}/{choice.name}")
+    with Progress("measuring speed and error") as bar:
+        measured = measure_all(options, measurer, pyplot, bar)
     if not measured:
-        sys.exit("nothing to measure")
+        sys.exit("speed-error.py: error: expected scenes and choices that go together, "
+                 "but none of these do")
     write_csv(f"{options.out}/points.csv",
               [p.record() for _, points, _ in measured for p in points])
-    modes = failures.collect(options)
+    with Progress("measuring failure modes"):
+        modes = failures.collect(options)
     summary.write_summary(measured, modes, f"{options.out}/summary.md")
     page.write_page(f"{options.out}/index.html", measured, modes, notes)
     print(f"wrote {options.out}/index.html")

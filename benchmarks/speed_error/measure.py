@@ -77,7 +77,17 @@ class Measurer:
         self.root = root
         self.folder = options.out
         self.simplifier = Simplifier(options, root)
+        self.steps = 0  # that are done
+        self.advance = lambda: None  # is called after each
         os.makedirs(f"{self.folder}/images", exist_ok=True)
+
+    def count_steps(self, choice):
+        """Of measure(): the reference, then each setting's picture and rounds."""
+        return 1 + len(choice.settings) * (1 + self.options.rounds)
+
+    def end_step(self):
+        self.steps += 1
+        self.advance()
 
     def size(self):
         return ["--width", str(self.options.width),
@@ -125,6 +135,7 @@ class Measurer:
         reference = f"{stem}-reference"
         self.draw(choice, choice.reference, scene, f"{reference}.exr",
                   f"{reference}.jpg")
+        self.end_step()
         points = []
         for i, setting in enumerate(choice.settings):
             point = Point(choice.name, scene.name, setting.name,
@@ -136,9 +147,11 @@ class Measurer:
                                         point.map)
             os.remove(f"{stem}-{i}.exr")
             points.append(point)
+            self.end_step()
         os.remove(f"{reference}.exr")
         for _ in range(self.options.rounds):
             for setting, point in zip(choice.settings, points):
                 point.times.append(self.time(choice, setting, scene))
+                self.end_step()
         mark_front(points)
         return points

@@ -10,6 +10,7 @@ import numpy as np
 
 from ._errors import RunError
 from ._pipeline import Array, Pipeline
+from ._progress import Progress
 from ._records import DType
 
 
@@ -156,6 +157,11 @@ def compare(
         raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
     if tolerance < 0:
         raise ValueError("expected a tolerance of at least 0")
+    with Progress(f"comparing {pipe.name} with {against}"):
+        return _compare(pipe, against, tolerance)
+
+
+def _compare(pipe: Pipeline, against: str, tolerance: float) -> Comparison:
     first = Pipeline(pipe.program.with_target(against))
     second = Pipeline(pipe.program)
     expected_error = _run_copy(pipe, first)

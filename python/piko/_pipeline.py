@@ -18,6 +18,7 @@ from . import _core
 from ._arrays import Bound, DeviceArray, assign, take_array, view_of
 from ._compile import Program, Source, compile
 from ._errors import RunError
+from ._progress import Progress
 from ._records import DType, make_dtype
 from ._stats import Stats, read_stats
 
@@ -479,7 +480,8 @@ class Pipeline:
         )
         self._user = threading.get_ident()
         try:
-            status = self._core.run(stream, hears)
+            with Progress(f"running {self.name}"):
+                status = self._core.run(stream, hears)
         finally:
             self._user = None
         self._check(status)
@@ -487,7 +489,8 @@ class Pipeline:
     def capture(self, path: Source) -> None:
         """Writes what a run would take now to a file, for piko-render and piko-tune."""
         self._use()
-        self._check(self._core.capture(os.fspath(path)))
+        with Progress(f"writing {os.fspath(path)}"):
+            self._check(self._core.capture(os.fspath(path)))
 
     def stats(self) -> Stats:
         """What runs did, and where their time went, since reset_stats()."""

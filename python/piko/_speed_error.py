@@ -29,6 +29,7 @@ from ._compare import bind_copy, has_memory
 from ._compile import Program, Source, change_options, compile
 from ._errors import Error
 from ._pipeline import Array, Pipeline
+from ._progress import Progress
 
 Setup = Callable[[Pipeline], None]
 Picture = Union[str, Callable[[Pipeline], Any]]
@@ -408,35 +409,40 @@ def speed_error(
     counts = {"rounds": rounds, "frames": frames}
     _check_arguments(pipe, variants, reference, metric, counts)
     maker = _Maker(pipe, setup, common)
-    error_of = _METRICS[metric]
     right, described = {"target": "reference"}, _OWN
     if isinstance(reference, str):
         right, described = dict(variants[reference]), f"'{reference}'"
     elif reference is not None:
         right, described = dict(reference), "the reference"
-    expected = _attempt("reference", lambda: _run_once(maker, right, picture)[1])
-    pipes: Dict[str, Pipeline] = {}
-    points: Dict[str, SpeedErrorPoint] = {}
-    for name, variant in variants.items():
+    with Progress(f"measuring {len(variants)} variants") as bar:
+        steps = len(variants) * (1 + rounds)
+        pipes: Dict[str, Pipeline] = {}
+        points: Dict[str, SpeedErrorPoint] = {}
+        expected = _attempt("reference", lambda: _run_once(maker, right, picture)[1])
+        for name, variant in variants.items():
 
-        def measure() -> Errors:
-            pipes[name], result = _run_once(maker, variant, picture)
-            return expected.measure(result)
+            def measure() -> Errors:
+                pipes[name], result = _run_once(maker, variant, picture)
+                return expected.measure(result)
 
-        points[name] = SpeedErrorPoint(name, 0.0, (), _attempt(name, measure))
-    if getattr(points[next(iter(points))].errors, error_of) is None:
-        raise ValueError("metric: expected max, mean, rms or p99, because flip is of pictures")
-    for _ in range(rounds):
-        for name, point in points.items():
-            taken = _attempt(name, lambda: _time_runs(pipes[name], frames, seconds))
-            points[name] = replace(point, times=(*point.times, taken))
+            points[name] = SpeedErrorPoint(name, 0.0, (), _attempt(name, measure))
+            bar.update(len(points) / steps)
+        error_of = _METRICS[metric]
+        if None in (getattr(one.errors, error_of) for one in points.values()):
+            raise ValueError(
+                "metric: expected max, mean, rms or p99, because flip is of pictures"
+            )
+        for turn in range(rounds):
+            for place, (name, point) in enumerate(points.items()):
+                taken = _attempt(name, lambda: _time_runs(pipes[name], frames, seconds))
+                points[name] = replace(point, times=(*point.times, taken))
+                bar.update((len(points) * (turn + 1) + place + 1) / steps)
     found = [replace(one, ms=statistics.median(one.times)) for one in points.values()]
     front = pareto_front(
         [one.ms for one in found], [getattr(one.errors, error_of) for one in found]
     )
     marked = tuple(replace(one, front=is_on) for one, is_on in zip(found, front))
-    name = next(iter(pipes.values())).name
-    return SpeedError(name, error_of, described, marked)
+    return SpeedError(next(iter(pipes.values())).name, error_of, described, marked)
 
 
 def _run_once(

@@ -16,6 +16,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
 from ._compile import Program, Source
 from ._errors import Error
 from ._pipeline import Pipeline
+from ._progress import Progress
 
 # Of piko.compile's options those that piko-tune has, by its names.
 _OPTIONS = {
@@ -127,7 +128,8 @@ def tune(
         command += _arguments(program)
         if space:
             command += ["--space", ",".join(space)]
-        done = subprocess.run(command, capture_output=True, text=True)
+        with Progress(f"tuning {program.name}"):
+            done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
             said = done.stderr.strip() or f"piko-tune ended with {done.returncode}"
             if done.returncode == _NOT_LOADED:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-"""Ctrl-C, and what is said while the compiler works."""
+"""Ctrl-C, and what a terminal shows of what takes long."""
 
 import os
 import pty
@@ -9,7 +9,7 @@ import sys
 import unittest
 
 import piko
-from support import DOTS, HERE, TABLE, run_python
+from support import DOTS, HERE, run_python
 
 # Each begins a line when it is about to do what takes long.
 COMPILE = """
@@ -88,38 +88,75 @@ class Interrupts(unittest.TestCase):
         self.assertIs(signal.getsignal(signal.SIGINT), before)
 
 
+# What takes long, or would.
+WORKS = {
+    "compile": "piko.compile(TABLE + f'// {time.time_ns()}', name='table.piko.cpp')",
+    "run": "make().run()",
+    "compare": "piko.compare(make(), against='gpu-on-cpu')",
+    "capture": "make().capture('/dev/null')",
+    "tune": "piko.tune(make(), space=['schedules'], budget=8)",
+    "chart": "piko.speed_error(make(), {'a': {}, 'b': {'threads': 1}}, rounds=1)",
+}
 PROGRESS = """
 import piko, sys, time
-from piko import _jobs
-_jobs.QUIET = 0
-piko.compile(sys.stdin.read() + f"// {time.time_ns()}", name="table.piko.cpp")
+from support import TABLE
+def make():
+    pipe = piko.Pipeline(TABLE, domain=(1, 1), values=[0] * 9, name="table.piko.cpp")
+    pipe.feed("set", list(range(9)))
+    return pipe
 """
+# That of the whole, of which compiling and running are parts.
+SHOWN = {
+    "compile": r"compiling table\.piko\.cpp \.\.\. 0 s",
+    "run": r"running Table \.\.\. 0 s",
+    "compare": r"comparing Table with gpu-on-cpu \.\.\. 0 s",
+    "capture": r"writing /dev/null \.\.\. 0 s",
+    "tune": r"tuning Table \.\.\. 0 s",
+    "chart": r"measuring 2 variants \[#{20}\.{20}\] 50%",
+}
 
 
 class Progress(unittest.TestCase):
-    def run_with(self, stderr):
+    def run_with(self, work, stderr, after="0"):
         return subprocess.run(
-            [sys.executable, "-c", PROGRESS],
-            input=TABLE,
+            [sys.executable, "-c", PROGRESS + WORKS[work]],
+            cwd=HERE,
+            env={**os.environ, "PIKO_PROGRESS_AFTER": after},
             stdout=subprocess.PIPE,
             stderr=stderr,
             text=True,
             timeout=100,
         )
 
-    def test_terminal(self):
+    def run_on_terminal(self, work, after="0"):
         ours, theirs = pty.openpty()
         try:
-            self.assertEqual(self.run_with(theirs).returncode, 0)
-            shown = os.read(ours, 10000).decode()
+            done = self.run_with(work, theirs, after)
+            os.write(theirs, b"end")  # so that there is something to read
+            shown = os.read(ours, 100000).decode()
         finally:
             os.close(ours)
             os.close(theirs)
-        self.assertRegex(shown, r"^\rpiko: compiling table.piko.cpp: \d+ s")
-        self.assertTrue(shown.endswith("\r\x1b[K"))
+        self.assertEqual((done.returncode, done.stdout), (0, ""), shown)
+        return shown.removesuffix("end")
+
+    def test_terminal(self):
+        for work, pattern in SHOWN.items():
+            with self.subTest(work):
+                shown = self.run_on_terminal(work)
+                self.assertRegex(shown, r"\r" + pattern + r"\x1b\[K")
+                self.assertTrue(shown.endswith("\r\x1b[K"), shown)
+                self.assertNotIn("\n", shown)
+
+    def test_before(self):
+        """Nothing of what does not take as long as is asked for."""
+        self.assertEqual(self.run_on_terminal("run", after="1000"), "")
 
     def test_no_terminal(self):
-        self.assertEqual(self.run_with(subprocess.PIPE).stderr, "")
+        for work in WORKS:
+            with self.subTest(work):
+                done = self.run_with(work, subprocess.PIPE)
+                self.assertEqual((done.returncode, done.stderr, done.stdout), (0, "", ""))
 
 
 if __name__ == "__main__":

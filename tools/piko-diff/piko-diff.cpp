@@ -1,6 +1,7 @@
 //===- piko-diff.cpp - Measure how far images are from another one --------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Piko/CommandLine/CommandLine.h"
+#include "Piko/CommandLine/Progress.h"
 #include "Piko/Scene/ImageError.h"
 #include "Piko/Scene/ImageFile.h"
 #include "Piko/Scene/Json.h"
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 using namespace piko;
 using namespace piko::render;
@@ -100,15 +102,21 @@ Result<bool> compareFiles(const Options &options) {
   if (!options.map.empty())
     if (auto ok = checkImageFormat(options.map); !ok)
       return ok.error();
-  auto reference = readImage(options.reference);
+  auto read = [](const std::string &path) {
+    Progress progress("loading " + path);
+    return readImage(path);
+  };
+  auto reference = read(options.reference);
   if (!reference)
     return reference.error();
-  auto image = readImage(options.image);
+  auto image = read(options.image);
   if (!image)
     return image.error();
   std::vector<float> flip;
+  std::optional<Progress> progress("comparing " + options.image);
   auto error =
       compareImages(*reference, *image, options.pixelsPerDegree, &flip);
+  progress.reset();
   if (!error)
     return Error{"'" + options.reference + "' and '" + options.image +
                  "': " + error.error().message};

@@ -111,6 +111,6 @@ Result<Mesh> render::loadMesh(const std::string &path,
                               const ProgressFunction &progress) {
   auto mesh = load(path, progress);
   if (!mesh)
-    return Error{"cannot load scene '" + path + "': " + mesh.error().message};
+    return Error{describeLoad(path) + mesh.error().message};
   return mesh;
 }

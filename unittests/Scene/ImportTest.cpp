@@ -62,6 +62,10 @@ TEST_F(Import, SurvivesItsEnd) {
   EXPECT_NE(errorOf("kill -ABRT $$").find("ended by signal 6"),
             std::string::npos);
   EXPECT_NE(errorOf("exit 3").find("ended with status 3"), std::string::npos);
+  EXPECT_NE(errorOf("echo noise >&2; echo 'piko-import: error: out of memory' "
+                    ">&2; exit 1")
+                .find("square.off': out of memory"),
+            std::string::npos);
   EXPECT_NE(errorOf("kill -XCPU $$").find("takes longer than 600 s"),
             std::string::npos);
 }

@@ -24,6 +24,7 @@
 #include "Report.h"
 #include "Run.h"
 
+#include "Piko/CommandLine/Progress.h"
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Replay/Measure.h"
 
@@ -31,6 +32,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <unistd.h>
@@ -162,6 +164,7 @@ bool runs(const Options &options, size_t target, size_t place) {
 /// Runs one case on its targets; true if all is equal. Throws if it cannot be run.
 bool compare(const Options &options, const Case &input, Programs &programs,
              size_t place = 0) {
+  std::optional<piko::Progress> progress("comparing " + input.pipe);
   Run reference(programs.reference(input.pipe), input);
   Outcome expected = reference(1);
   if (expected.isBlank() && (options.cases.empty() || hasOwnCases(options)))
@@ -186,7 +189,10 @@ bool compare(const Options &options, const Case &input, Programs &programs,
     isStrict &= run.isStrict;
     errors.merge(run.errors);
     (isEqual ? equal : different).push_back(target.name);
+    progress->update(double(&target + 1 - options.targets.data()) /
+                     double(options.targets.size()));
   }
+  progress.reset();
   report.print();
   printVerdict(expected, isStrict, equal, different);
   if (options.stops)
@@ -195,7 +201,9 @@ bool compare(const Options &options, const Case &input, Programs &programs,
 }
 
 bool compareAll(const Options &options) {
+  std::optional<piko::Progress> progress("reading " + options.file);
   Programs programs(options);
+  progress.reset();
   auto choosePipe = [&](Case &input) {
     std::vector<std::string> names = programs.names();
     if (!input.pipe.empty())

@@ -4,6 +4,7 @@
 
 #include "MeshReaders.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -14,6 +15,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -44,21 +46,22 @@ static std::string findProgram() {
 
 namespace {
 
-/// The program's standard output, and its end.
+/// The program's standard output, what it says is wrong, and its end.
 class ImportProcess {
 public:
   ImportProcess() = default;
   ImportProcess(const ImportProcess &) = delete;
   ImportProcess &operator=(const ImportProcess &) = delete;
   ~ImportProcess() {
-    for (int end : ends)
+    for (int end : {ends[0], ends[1], messages})
       if (end >= 0)
         close(end);
   }
 
   /// An error number, or 0.
   int start(const std::string &scene) {
-    if (pipe2(ends, O_CLOEXEC) != 0)
+    messages = memfd_create(programName, MFD_CLOEXEC);
+    if (messages < 0 || pipe2(ends, O_CLOEXEC) != 0)
       return errno;
     posix_spawn_file_actions_t files;
     posix_spawnattr_t attributes;
@@ -66,7 +69,8 @@ public:
     posix_spawnattr_init(&attributes);
     posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&files, ends[1], 1);
-    posix_spawn_file_actions_addopen(&files, 2, "/dev/null", O_WRONLY, 0);
+    // A file in memory: nobody need read it meanwhile.
+    posix_spawn_file_actions_adddup2(&files, messages, 2);
     // Not the host's: what it blocks and ignores would let the program live on.
     sigset_t none, all;
     sigemptyset(&none);
@@ -87,19 +91,13 @@ public:
     return problem;
   }
 
-  std::string readAll() {
-    std::string content;
-    char chunk[1 << 16];
-    for (;;) {
-      ssize_t count = read(ends[0], chunk, sizeof chunk);
-      if (count < 0 && errno == EINTR)
-        continue;
-      if (count <= 0)
-        return content;
-      content.append(chunk, size_t(count));
-    }
-  }
+  std::string readOutput() { return readAll(ends[0]); }
 
+  /// After its end.
+  std::string readMessages() {
+    lseek(messages, 0, SEEK_SET);
+    return readAll(messages);
+  }
   /// How it ended; none where the host has asked for that before.
   std::optional<int> wait() {
     int status;
@@ -110,13 +108,30 @@ public:
   }
 
 private:
-  int ends[2] = {-1, -1};
+  static std::string readAll(int from) {
+    std::string content;
+    char chunk[1 << 16];
+    for (;;) {
+      ssize_t count = read(from, chunk, sizeof chunk);
+      if (count < 0 && errno == EINTR)
+        continue;
+      if (count <= 0)
+        return content;
+      content.append(chunk, size_t(count));
+    }
+  }
+
+  int ends[2] = {-1, -1}, messages = -1;
   pid_t child = -1;
 };
 
 } // namespace
 
-static std::string describeEnd(int status) {
+/// Why it has failed, as it says or as its end does.
+static std::string describeEnd(int status, const std::string &messages,
+                               const std::string &scene) {
+  const std::string ours = std::string(programName) + ": error: ",
+                    place = describeLoad(scene);
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
     return "it takes longer than " + std::to_string(importSeconds) +
            " s to read";
@@ -124,24 +139,31 @@ static std::string describeEnd(int status) {
     return std::string("what reads it ended by signal ") +
            std::to_string(WTERMSIG(status)) + " (" +
            strsignal(WTERMSIG(status)) + ")";
+  if (size_t at = messages.rfind(ours); at != std::string::npos) {
+    std::string said = messages.substr(at + ours.size());
+    said.resize(std::min(said.find('\n'), said.size()));
+    return said.starts_with(place) ? said.substr(place.size()) : said;
+  }
   return "what reads it ended with status " +
          std::to_string(WEXITSTATUS(status));
+}
+
+std::string render::describeLoad(const std::string &path) {
+  return "cannot load scene '" + path + "': ";
 }
 
 Result<Mesh> render::importMesh(const std::string &path) {
   ImportProcess process;
   // A name that begins with a dash is no option.
-  if (int problem = process.start(fs::absolute(path).string()))
+  std::string scene = fs::absolute(path).string();
+  if (int problem = process.start(scene))
     return failToStart(problem);
-  std::string content = process.readAll();
+  std::string content = process.readOutput();
   std::optional<int> status = process.wait();
   if (status && *status != 0) {
     if (WIFEXITED(*status) && WEXITSTATUS(*status) == 127) // of the spawn
       return failToStart(ENOENT);
-    return Error{describeEnd(*status)};
+    return Error{describeEnd(*status, process.readMessages(), scene)};
   }
-  constexpr std::string_view wrong = "error: ";
-  if (content.starts_with(wrong))
-    return Error{content.substr(wrong.size())};
   return readPly(content);
 }

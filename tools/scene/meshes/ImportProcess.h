@@ -15,6 +15,9 @@ inline constexpr unsigned importSeconds = 600;
 /// Whatever becomes of it, it ends with a mesh that was checked or an error.
 Result<Mesh> importMesh(const std::string &path);
 
+/// What a message about a scene's file begins with.
+std::string describeLoad(const std::string &path);
+
 } // namespace piko::render
 
 #endif // PIKO_TOOLS_SCENE_IMPORTPROCESS_H

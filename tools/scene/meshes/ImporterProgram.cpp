@@ -4,7 +4,7 @@
 //   piko-import FILE
 //
 // Reads a scene by assimp and writes it to the standard output as a PLY file,
-// or what is wrong with it behind "error: ". It is a program of its own,
+// or says what is wrong with it and ends with 1. It is a program of its own,
 // because assimp has assertions, and reads what it should not, on files that
 // are not what they seem; so it is taken to be as right as a file is. See
 // ImportProcess.h.
@@ -15,12 +15,17 @@
 #include "PackedFile.h"
 
 #include "Piko/CommandLine/CommandLine.h"
+#include "Piko/CommandLine/Progress.h"
+#include "Piko/Support/OutOfMemory.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <assimp/Importer.hpp>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <csignal>
 #include <cstdio>
+#include <optional>
 #include <sys/resource.h>
 
 using namespace piko;
@@ -168,9 +173,22 @@ void limitTime() {
   setrlimit(RLIMIT_CORE, &none);
 }
 
+int fail(const Error &error) {
+  std::fprintf(stderr, "piko-import: error: %s\n", error.message.c_str());
+  return 1;
+}
+
+/// The exit status, once all is written.
+int finish() {
+  auto ok = piko::support::finishOutput();
+  return ok ? 0 : fail(ok.error());
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-import");
+  std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   CommandLine line("piko-import FILE",
                    "Reads a scene of a format that piko-render does not read "
                    "itself, and writes it as PLY to the standard output. "
@@ -179,19 +197,20 @@ int main(int argc, char **argv) {
   std::string file;
   line.addText("FILE", "", file, "what assimp reads, gzipped or not");
   auto help = line.read({argv + 1, argv + argc});
-  if (!help || (help->empty() && file.empty())) {
-    std::fprintf(stderr, "piko-import: error: %s\n",
-                 help ? "expected a scene's file"
-                      : help.error().message.c_str());
-    return 2;
+  if (!help)
+    return fail(help.error());
+  if (!help->empty()) {
+    std::fputs(help->c_str(), stdout);
+    return finish();
   }
-  if (!help->empty())
-    return std::fputs(help->c_str(), stdout) < 0;
+  if (file.empty())
+    return fail({"expected a scene's file"});
   limitTime();
+  std::optional<Progress> progress("loading " + file);
   auto mesh = import(file);
-  if (mesh)
-    writePly(*mesh);
-  else
-    std::printf("error: %s", mesh.error().message.c_str());
-  return std::fflush(stdout) == 0 && !std::ferror(stdout) ? 0 : 1;
+  progress.reset();
+  if (!mesh)
+    return fail({describeLoad(file) + mesh.error().message});
+  writePly(*mesh);
+  return finish();
 }
