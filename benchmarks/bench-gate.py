@@ -29,6 +29,7 @@ from speed_gate.builds import Build, build_commit
 from speed_gate.judge import BASE, BUILDS, NEW, compare, is_decided, report
 from speed_gate.units import list_units
 from suite import kernels
+from commands import run_main
 
 ROOT = bodies.ROOT
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
@@ -196,4 +197,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

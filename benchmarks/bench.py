@@ -31,6 +31,7 @@ from figure4 import PIPES, print_table
 from suite import bodies as bodies_section
 from suite import (against, fusion, kernels, maths, page, raster, roofline,
                    runtime)
+from commands import run_main
 
 ROOT = bodies.ROOT
 SECTIONS = {"raster": raster, "fusion": fusion, "kernels": kernels,
@@ -184,4 +185,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

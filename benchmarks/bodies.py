@@ -20,7 +20,7 @@ import statistics
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-from commands import call
+from commands import call, run_main
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CXX = ["-std=c++20", "-O2", "-ffp-contract=off", "-DPIKO_BODY", "-w"]
@@ -185,4 +185,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

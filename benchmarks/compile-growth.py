@@ -27,6 +27,8 @@ import subprocess
 import sys
 import tempfile
 
+from commands import run_main
+
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 HEAD = """#include <piko.h>
@@ -133,4 +135,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main)

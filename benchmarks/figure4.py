@@ -26,7 +26,7 @@ import statistics
 import sys
 
 from charts import COLORS, find_pyplot
-from commands import call
+from commands import call, run_main
 from outputs import save_figure, write_csv
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -283,4 +283,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -24,7 +24,7 @@ import sys
 import tempfile
 import zlib
 
-from commands import call
+from commands import call, run_main
 from outputs import write_text
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -223,4 +223,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

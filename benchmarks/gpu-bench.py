@@ -31,6 +31,7 @@ from figure4 import PIPES, ROOT
 from gpu_model.chips import read_chips
 from gpu_suite import figure4, figure5, frames, published, reruns, timing
 from suite import page, raster
+from commands import run_main
 
 SECTIONS = {"frames": frames, "figure4": figure4, "figure5": figure5,
             "reruns": reruns, "published": published}
@@ -140,4 +141,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

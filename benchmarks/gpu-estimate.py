@@ -19,7 +19,7 @@ import argparse
 import json
 import sys
 
-from commands import call
+from commands import call, run_main
 from figure4 import ROOT, print_table
 from gpu_model import counting
 from gpu_model.chips import read_chips
@@ -154,4 +154,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main)

@@ -19,7 +19,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-from commands import call
+from commands import call, run_main
 from gpu_model.counting import COLUMNS, read_explained
 from gpu_model.slots import find_assembler
 
@@ -123,4 +123,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main)

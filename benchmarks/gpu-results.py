@@ -16,6 +16,7 @@ import sys
 
 from charts import COLORS, find_pyplot
 from outputs import save_figure, write_text
+from commands import run_main
 
 BASE = "Baseline"
 
@@ -176,11 +177,8 @@ def main():
     parser.add_argument("results")
     parser.add_argument("--out", required=True)
     arguments = parser.parse_args()
-    try:
-        write_page(read(arguments.results), arguments.out)
-    except OSError as error:
-        sys.exit(f"gpu-results.py: {error}")
+    write_page(read(arguments.results), arguments.out)
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

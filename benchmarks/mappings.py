@@ -35,7 +35,7 @@ import subprocess
 import sys
 
 from bodies import CXX, find_bodies, get_includes, get_openmp, get_source
-from commands import call
+from commands import call, run_main
 from outputs import write_text
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -433,4 +433,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

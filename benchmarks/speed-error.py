@@ -26,6 +26,7 @@ from speed_error import draw, failures, page, summary
 from speed_error.choices import CHOICES
 from speed_error.measure import Measurer, Scene
 from suite.page import find_processor
+from commands import run_main
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SCENES = ["/usr/share/glmark2/models/bunny.obj",
@@ -160,4 +161,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -12,7 +12,7 @@ import argparse
 import json
 import os
 
-from commands import call
+from commands import call, run_main
 from outputs import write_csv
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -107,4 +107,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -33,6 +33,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 import bodies  # noqa: E402
 from suite import kernels  # noqa: E402
+from tool import run_main
 
 # LLVM's own change no dialect of MLIR.
 OF_LLVM = {"loop-vectorize", "slp-vectorizer"}
@@ -275,4 +276,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -18,6 +18,8 @@ import re
 import subprocess
 import sys
 
+from tool import run_main
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FENCE = re.compile(r"^[ ]*```mlir\n(.*?)^[ ]*```", re.S | re.M)
 
@@ -259,4 +261,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -13,6 +13,8 @@ import re
 import subprocess
 import sys
 
+from tool import run_main
+
 
 def exported(nm, library):
     command = [nm, "-D", "--defined-only", "--format=posix", library]
@@ -64,4 +66,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main)

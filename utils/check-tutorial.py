@@ -24,6 +24,8 @@ import shutil
 import subprocess
 import sys
 
+from tool import run_main
+
 FENCE = re.compile(r"^( *)```(\w+)( fails)?\n(.*?)^ *```", re.S | re.M)
 NAME = re.compile(r"`([\w.-]+\.\w+)`")
 PICTURE = re.compile(r"!\[[^]]*\]\(([\w.-]+\.png)\)|<img src=\"([\w.-]+\.png)\"")
@@ -225,4 +227,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

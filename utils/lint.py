@@ -30,6 +30,7 @@ import sys
 import tempfile
 
 from document_links import find_dead
+from tool import run_main
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LLVM_BIN = "/usr/lib/llvm-22/bin"
@@ -384,4 +385,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

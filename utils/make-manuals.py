@@ -16,6 +16,8 @@ import pathlib
 import re
 import subprocess
 
+from tool import run_main
+
 FILES = ("FILE", "IMAGE", "SCENE", "PIPELINE", "REFERENCE", "CAPTURE")
 LLVM_OPTION = re.compile(r"^ +(--?[A-Za-z][\w.-]*)(\[?=<[^>]*>\]?)? +- +(.*)$")
 LICENCE = "SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception"
@@ -184,4 +186,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

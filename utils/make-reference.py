@@ -12,6 +12,8 @@ import re
 import subprocess
 import sys
 
+from tool import run_main
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LLVM = pathlib.Path("/usr/lib/llvm-22")
 
@@ -179,4 +181,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -21,6 +21,8 @@ import sysconfig
 import tempfile
 import zipfile
 
+from tool import run_main
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 METADATA = """Metadata-Version: 2.1
@@ -113,7 +115,7 @@ def make(build, out):
     tag = f"cp{sysconfig.get_config_var('py_version_nodot')}"
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     tag = f"{tag}-{tag}-{platform}"
-    out.mkdir(parents=True, exist_ok=True)
+    read_version(build)  # whether there is a build
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         info = stage(build, folder, tag)
@@ -121,6 +123,7 @@ def make(build, out):
             if str(build.resolve()).encode() in read_paths(file):
                 sys.exit(f"make-wheel: {file.name} looks for libraries in the build")
         wheel = out / f"{info.name.removesuffix('.dist-info')}-{tag}.whl"
+        out.mkdir(parents=True, exist_ok=True)
         write(folder, info, wheel)
     return wheel
 
@@ -216,4 +219,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -32,7 +32,7 @@ def read_obj(path: str) -> Tuple[piko.Array, piko.Array]:
             corners = [c - 1 if c > 0 else len(positions) + c for c in corners]
             triangles += [[corners[0], b, c] for b, c in zip(corners[1:], corners[2:])]
     if not triangles:
-        raise SystemExit(f"{path}: expected triangles, but there are none")
+        raise SystemExit(f"bunny.py: error: '{path}': expected triangles, but there are none")
     return np.array(positions, "f4"), np.array(triangles, "i4")
 
 
@@ -104,4 +104,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (OSError, ValueError, IndexError, piko.Error) as error:
+        raise SystemExit(f"bunny.py: error: {error}") from None

@@ -130,4 +130,7 @@ def main(arguments: List[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv)
+    try:
+        main(sys.argv)
+    except (OSError, piko.Error) as error:
+        raise SystemExit(f"tour.py: error: {error}") from None

@@ -44,11 +44,11 @@ def main() -> None:
         )
     chart.write_csv(sys.argv[3])
     if len(sys.argv) == 5:
-        try:
-            chart.draw(sys.argv[4])
-        except ImportError as error:
-            raise SystemExit(f"tradeoff.py: error: {error}") from None
+        chart.draw(sys.argv[4])
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (ImportError, OSError, ValueError, piko.Error) as error:
+        raise SystemExit(f"tradeoff.py: error: {error}") from None

@@ -16,6 +16,7 @@
 #include "ProgramSymbol.h"
 #include "ReferenceObject.h"
 
+#include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/Path.h"
 #include "llvm/TargetParser/Host.h"
 
@@ -206,8 +207,26 @@ Files piko::openFiles(const CompileOptions &source) {
   return files;
 }
 
+/// Whether C++ takes it for the name of a namespace, nested or not.
+static bool isNamespace(llvm::StringRef name) {
+  llvm::SmallVector<llvm::StringRef> parts;
+  name.split(parts, "::");
+  return llvm::all_of(parts, [](llvm::StringRef part) {
+    return !part.empty() && !llvm::isDigit(part[0]) &&
+           llvm::all_of(part,
+                        [](char c) { return llvm::isAlnum(c) || c == '_'; });
+  });
+}
+
 std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
                                                   std::string &diagnostics) {
+  if (!given.nameSpace.empty() && given.execution == ExecutionTarget::CPU &&
+      !isNamespace(given.nameSpace)) {
+    diagnostics += "error: expected a namespace such as 'a' or 'a::b', but got "
+                   "'" +
+                   given.nameSpace + "'\n";
+    return std::nullopt;
+  }
   if (given.execution == ExecutionTarget::Reference)
     return compileReferenceObject(given, diagnostics);
   ObjectOptions options = given;

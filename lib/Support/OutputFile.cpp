@@ -255,8 +255,9 @@ OutputFiles::~OutputFiles() {
 }
 
 static Error cannotWrite(const std::string &path, Errno problem) {
-  return Error{"cannot write '" + path +
-               "': " + std::generic_category().message(problem)};
+  std::string name = path == "-" ? "the standard output" : "'" + path + "'";
+  return Error{"cannot write " + name + ": " +
+               std::generic_category().message(problem)};
 }
 
 Result<Done> OutputFiles::add(const std::string &path,
@@ -300,6 +301,11 @@ Result<Done> support::replaceFile(const std::string &path,
   if (problem)
     return Error{std::generic_category().message(problem)};
   return Done{};
+}
+
+Result<Done> support::checkWritable(const std::string &path) {
+  OutputFiles files; // none of which is kept
+  return files.add(path, "");
 }
 
 Result<Done> support::finishOutput() {

@@ -46,7 +46,7 @@ Result<Options> parseOptions(const std::vector<std::string> &words) {
   line.addNumber("--pixels-per-degree", "P", options.pixelsPerDegree,
                  "how finely an observer sees the images (67.02: a display of "
                  "3840 pixels, 0.7 m wide, from 0.7 m)",
-                 0);
+                 0.001, 10000);
   line.add_flag("--json", options.json, "print one line of JSON");
   line.addNumber("--fail-above", "E", options.failAbove,
                  "exit with 1 if the largest difference is above E", 0);

@@ -3,19 +3,22 @@
 // Runs passes on `.mlir` files.
 
 #include "Piko/CommandLine/Help.h"
+#include "Piko/CommandLine/LLVMTool.h"
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Driver/PassReport.h"
 #include "Piko/Driver/Registration.h"
 #include "Piko/Support/OutOfMemory.h"
 
+#include "mlir/IR/BuiltinOps.h"
 #include "mlir/IR/MLIRContext.h"
 #include "mlir/Pass/PassManager.h"
-#include "mlir/Support/FileUtilities.h"
 #include "mlir/Tools/mlir-opt/MlirOptMain.h"
 #include "llvm/Support/CommandLine.h"
 #include "llvm/Support/InitLLVM.h"
 #include "llvm/Support/MemoryBuffer.h"
-#include "llvm/Support/ToolOutputFile.h"
+
+#include <csignal>
+#include <cstring>
 
 using namespace mlir;
 
@@ -51,35 +54,63 @@ static const piko::ToolHelp help{
                  .brief = "which dialects there are"}},
     .isLLVMs = true};
 
+static const piko::LLVMTool tool("piko-opt");
+
 enum class ReportFormat { None, Text, JSON };
 
-/// Runs passes and says on the standard error what they changed.
-static LogicalResult runWithReport(const std::string &input,
-                                   const std::string &output,
-                                   ReportFormat format,
-                                   DialectRegistry &registry) {
+/// Passes that there are not, and wrong options of them, which MLIR says
+/// nowhere.
+static bool checkPasses(const MlirOptMainConfig &config,
+                        DialectRegistry &registry) {
+  if (config.shouldUseExplicitModule()) // the top operation may be any
+    return true;
+  MLIRContext context(registry, MLIRContext::Threading::DISABLED);
+  std::string said;
+  ScopedDiagnosticHandler handler(&context, [&](Diagnostic &diagnostic) {
+    if (said.empty())
+      said = diagnostic.str();
+    return success();
+  });
+  PassManager passes(&context, ModuleOp::getOperationName(),
+                     PassManager::Nesting::Implicit);
+  if (succeeded(config.setupPassPipeline(passes)))
+    return true;
+  StringRef text(said);
+  if (size_t at = text.find(": error: "); at != StringRef::npos)
+    text = text.drop_front(at + strlen(": error: "));
+  text.consume_front("<Pass-Options-Parser>: ");
+  return tool.fail("passes: " + text.rtrim().str());
+}
+
+/// Runs passes and says on the standard error, if it is asked for, what they
+/// changed.
+static bool runPasses(const std::string &input, const std::string &output,
+                      ReportFormat format, DialectRegistry &registry) {
   piko::PassReport report;
   MlirOptMainConfig config = MlirOptMainConfig::createFromCLOptions();
   MlirOptMainConfig asAsked = config;
-  config.setPassPipelineSetupFn([&](PassManager &passes) {
-    report.follow(passes);
-    return asAsked.setupPassPipeline(passes);
-  });
-  std::string error;
-  auto from = openInputFile(input, &error);
-  auto to = from ? openOutputFile(output, &error) : nullptr;
-  if (!from || !to) {
-    llvm::errs() << "piko-opt: error: " << error << "\n";
-    return failure();
-  }
-  if (failed(MlirOptMain(to->os(), std::move(from), registry, config)))
-    return failure();
-  to->keep();
-  if (format == ReportFormat::JSON)
+  if (!checkPasses(asAsked, registry))
+    return false;
+  if (format != ReportFormat::None)
+    config.setPassPipelineSetupFn([&](PassManager &passes) {
+      report.follow(passes);
+      return asAsked.setupPassPipeline(passes);
+    });
+  std::unique_ptr<llvm::MemoryBuffer> file = tool.open(input);
+  if (!file)
+    return false;
+  std::string text;
+  llvm::raw_string_ostream stream(text);
+  bool isRight =
+      succeeded(MlirOptMain(stream, std::move(file), registry, config));
+  // Of parts of a file some may be right.
+  if ((isRight || output == "-") && !tool.write(output, text))
+    return false;
+  if (isRight && format == ReportFormat::JSON)
     report.writeJSON(llvm::errs());
-  else
+  else if (isRight && format == ReportFormat::Text)
     report.writeText(llvm::errs());
-  return success();
+  return isRight;
 }
 
 /// Remarks point at lines: the operations that they are about would be pages.
@@ -107,16 +138,26 @@ static int optimize(int argc, char **argv) {
   DialectRegistry registry;
   piko::registerPikoDialects(registry);
   piko::registerPikoPasses();
-  auto [input, output] = registerAndParseCLIOptions(
-      argc, argv, "Piko's optimizer: passes on .mlir files\n", registry);
-  if (report == ReportFormat::None)
-    return asMainReturnCode(MlirOptMain(argc, argv, input, output, registry));
+  llvm::cl::opt<std::string> input{llvm::cl::Positional,
+                                   llvm::cl::desc("<input file>"),
+                                   llvm::cl::init("-")};
+  llvm::cl::opt<std::string> output{"o", llvm::cl::desc("where to write"),
+                                    llvm::cl::value_desc("file"),
+                                    llvm::cl::init("-")};
+  std::string header =
+      registerCLIOptions("Piko's optimizer: passes on .mlir files\n", registry);
   llvm::InitLLVM init(argc, argv);
-  return asMainReturnCode(runWithReport(input, output, report, registry));
+  if (!tool.parseOptions(argc, argv, header))
+    return 1;
+  MlirOptMainConfig config = MlirOptMainConfig::createFromCLOptions();
+  if (config.shouldShowDialects() || config.shouldListPasses())
+    return asMainReturnCode(MlirOptMain(argc, argv, input, output, registry));
+  return runPasses(input, output, report, registry) ? 0 : 1;
 }
 
 int main(int argc, char **argv) {
   piko::support::reportOutOfMemory("piko-opt");
+  std::signal(SIGXFSZ, SIG_IGN); // to write beyond a limit is an error
   if (piko::answerHelp(help, argc, argv))
     return 0;
   return piko::runMainOnDeepStack([&] { return optimize(argc, argv); });

@@ -248,6 +248,9 @@ Result<Done> renderScene(Options options) {
   for (const std::string &image : options.images)
     if (auto ok = checkImageFormat(image); !ok)
       return ok.error();
+  if (!options.trace.empty())
+    if (auto ok = support::checkWritable(options.trace); !ok)
+      return ok.error();
   std::vector<Agreement> agreements;
   if (!options.against.empty()) {
     auto found = runAgainst(options);

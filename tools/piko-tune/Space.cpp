@@ -130,8 +130,10 @@ static std::optional<Space> readSpaceHere(const TuneOptions &options,
                         .defines = options.render.load.defines,
                         .cache = options.render.load.cache};
   std::vector<std::string> pipes = findPipes(options, source, context);
+  if (pipes.empty())
+    return std::nullopt;
   auto tunables = readTunables(source, context);
-  if (pipes.empty() || llvm::failed(tunables))
+  if (llvm::failed(tunables))
     return std::nullopt;
   SpaceReader reader{options};
   reader.add(Axis::Pipeline, "pipe", pipes);

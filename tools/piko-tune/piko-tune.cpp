@@ -28,15 +28,31 @@ using support::Result;
 
 namespace {
 
-Result<Done> writeFiles(const TuneResult &result) {
+/// An error if the files cannot be written: before a search, which takes long.
+Result<Done> checkFiles(const TuneOptions &options) {
+  for (const std::string &path : {options.out, options.chart, options.csv})
+    if (!path.empty())
+      if (auto ok = support::checkWritable(path); !ok)
+        return ok;
+  return Done{};
+}
+
+/// The files, and the standard output; all of them or, as far as that can be
+/// known before, none.
+Result<Done> write(const TuneResult &result) {
   const TuneOptions &options = result.options;
+  support::OutputFiles files;
   for (const auto &[path, text] : {std::pair(options.out, writeSetting(result)),
                                    std::pair(options.chart, drawChart(result)),
                                    std::pair(options.csv, writeCSV(result))})
     if (!path.empty())
-      if (auto ok = support::writeFile(path, text); !ok)
+      if (auto ok = files.add(path, text); !ok)
         return ok;
-  return Done{};
+  std::string text = options.json ? writeJson(result) : summarize(result);
+  std::fputs(text.c_str(), stdout);
+  if (auto ok = support::finishOutput(); !ok)
+    return ok;
+  return files.keep();
 }
 
 Result<Space> loadSpace(const TuneOptions &options) {
@@ -67,6 +83,8 @@ Result<Outcome> runSearch(Search &search, const TuneOptions &options) {
 
 /// Everything after the command line.
 Result<Done> tuneScene(const TuneOptions &options) {
+  if (auto ok = checkFiles(options); !ok)
+    return ok;
   auto space = loadSpace(options);
   if (!space)
     return space.error();
@@ -89,11 +107,7 @@ Result<Done> tuneScene(const TuneOptions &options) {
   if (!mappings)
     return mappings.error();
   result.mappings = *mappings;
-  std::string text = options.json ? writeJson(result) : summarize(result);
-  std::fputs(text.c_str(), stdout);
-  if (auto ok = support::finishOutput(); !ok)
-    return ok;
-  return writeFiles(result);
+  return write(result);
 }
 
 int fail(const Error &error) {

@@ -3,6 +3,7 @@
 
 #include "Piko/CommandLine/CommandLine.h"
 
+#include "llvm/ADT/STLExtras.h"
 #include "llvm/ADT/StringRef.h"
 #include "llvm/Support/Path.h"
 #include "llvm/Support/raw_ostream.h"
@@ -44,6 +45,10 @@ std::vector<std::string> splitPipes(const std::string &text) {
     else
       names.back() += c;
   }
+  if (llvm::is_contained(names, ""))
+    throw CommandLine::wrong(
+        "--pipe",
+        "expected names with commas between them, but got '" + text + "'");
   return names;
 }
 

@@ -7,6 +7,7 @@
 #include "Dependencies.h"
 #include "Options.h"
 
+#include "Piko/CommandLine/LLVMTool.h"
 #include "Piko/CommandLine/Messages.h"
 #include "Piko/CommandLine/Progress.h"
 #include "Piko/Driver/DeepStack.h"
@@ -155,14 +156,13 @@ static bool writeObject(const pikoc::Options &options,
   return bool(done);
 }
 
-/// LLVM's own options, which are the process's.
-static void setLLVMOptions(const std::vector<std::string> &options) {
+/// LLVM's own options, which are the process's; false after an error.
+static bool setLLVMOptions(const std::vector<std::string> &options) {
   std::vector<const char *> words = {"pikoc"};
   for (const std::string &option : options)
     words.push_back(option.c_str());
-  if (words.size() > 1)
-    llvm::cl::ParseCommandLineOptions(static_cast<int>(words.size()),
-                                      words.data());
+  return words.size() == 1 || LLVMTool("pikoc").parseOptions(
+                                  static_cast<int>(words.size()), words.data());
 }
 
 /// Returns the exit status.
@@ -176,7 +176,8 @@ static int compile(const std::vector<std::string> &words) {
     auto done = support::finishOutput();
     return done ? 0 : fail(done.error().message);
   }
-  setLLVMOptions(options->llvm);
+  if (!setLLVMOptions(options->llvm))
+    return 1;
   if (options->getEmit() == Emit::Object && !options->isListing()) {
     if (!writeObject(*options, outputs))
       return 1;

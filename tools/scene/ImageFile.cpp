@@ -12,6 +12,11 @@
 #include "Piko/Support/OutputFile.h"
 
 #include <png.h>
+#include <zlib.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
 
 using namespace piko;
 using namespace piko::render;
@@ -111,10 +116,53 @@ Result<Done> render::writeImage(const std::string &path, int width, int height,
   return Done{};
 }
 
+/// Of a PNG file: whether its chunks are there and have the right checksums.
+/// OpenImageIO's reader prints what it thinks of those that do not.
+static Result<Done> checkChunks(const std::string &path) {
+  std::string content;
+  if (std::FILE *file = std::fopen(path.c_str(), "rb")) {
+    char part[1 << 16];
+    while (size_t count = std::fread(part, 1, sizeof part, file))
+      content.append(part, count);
+    bool isRead = !std::ferror(file);
+    std::fclose(file);
+    if (!isRead)
+      return Error{std::generic_category().message(errno)};
+  }
+  constexpr std::string_view signature("\x89PNG\r\n\x1a\n", 8);
+  if (!content.starts_with(signature))
+    return Done{}; // of another format
+  auto read = [&](size_t at) {
+    uint32_t number = 0;
+    for (size_t i = 0; i < 4; ++i)
+      number = number << 8 | static_cast<unsigned char>(content[at + i]);
+    return size_t(number);
+  };
+  constexpr size_t around = 12; // the chunk's length, type and checksum
+  for (size_t at = signature.size(); at + around <= content.size();) {
+    size_t length = read(at);
+    if (length > content.size() - at - around)
+      break;
+    std::string_view chunk =
+        std::string_view(content).substr(at + 4, length + 4);
+    if (crc32(0, reinterpret_cast<const Bytef *>(chunk.data()),
+              uInt(chunk.size())) != read(at + 8 + length))
+      return Error{"a checksum is wrong: it is damaged"};
+    if (chunk.starts_with("IEND"))
+      return Done{};
+    at += around + length;
+  }
+  return Error{"it is cut short"};
+}
+
 Result<Image> render::readImage(const std::string &path) {
   std::error_code problem;
   if (!fs::exists(path, problem))
     return failTo("read", path, "there is no such file");
+  if (fs::is_directory(path, problem))
+    return failTo("read", path, "it is a folder");
+  if (auto ok = checkChunks(path); !ok)
+    return failTo("read", path, ok.error().message);
   auto functions = getFunctions();
   if (!functions)
     return failTo("read", path, functions.error().message);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -205,6 +206,19 @@ bool hasUnsoundReader(const std::string &path) {
   return signature == "GIF8" || signature == std::string_view("\0\0\1\0", 4);
 }
 
+/// What the library says, in a line and without a final stop; it may say
+/// nothing.
+Error describeProblem(std::string why) {
+  why.resize(std::min(why.find('\n'), why.size()));
+  while (why.ends_with('.') || why.ends_with(' '))
+    why.pop_back();
+  if (why.starts_with("OpenImageIO could not find a format reader"))
+    why = "it is of no format that OpenImageIO reads";
+  if (why.size() > 1 && std::islower(static_cast<unsigned char>(why[1])))
+    why[0] = char(std::tolower(static_cast<unsigned char>(why[0])));
+  return {why.empty() ? "it is cut short or damaged" : why};
+}
+
 Result<Image> read(const std::string &path) {
   if (hasUnsoundReader(path))
     return Error{"GIF and ICO images are not read"};
@@ -214,7 +228,7 @@ Result<Image> read(const std::string &path) {
   asStored.attribute("oiio:UnassociatedAlpha", 1);
   auto input = OIIO::ImageInput::open(path, &asStored);
   if (!input)
-    return Error{OIIO::geterror()};
+    return describeProblem(OIIO::geterror());
   if (std::string_view(input->format_name()) == "rla")
     return Error{"RLA images are not read"};
   const OIIO::ImageSpec &spec = input->spec();
@@ -225,7 +239,7 @@ Result<Image> read(const std::string &path) {
     return Error{"expected a picture of up to 2^30 pixels"};
   std::vector<float> values(size_t(spec.width) * spec.height * channels);
   if (!readValues(*input, values))
-    return Error{input->geterror()};
+    return describeProblem(input->geterror());
   Image image{spec.width, spec.height, {}};
   image.pixels.resize(size_t(spec.width) * spec.height);
   int colors = channels < 3 ? 1 : 3;

@@ -276,4 +276,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    sys.path.append(str(ROOT / "utils"))
+    from tool import run_main
+
+    run_main(main)

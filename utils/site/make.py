@@ -25,6 +25,7 @@ import api
 import check
 import lint
 from page import Page, highlight
+from tool import run_main
 
 ROOT = lint.ROOT
 # What the navigation is made of: the links of each of its sections.
@@ -247,4 +248,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -50,6 +50,10 @@ Result<Done> replaceFile(const std::string &path, std::string_view content);
 /// The same, with "cannot write 'PATH': " before the error.
 Result<Done> writeFile(const std::string &path, std::string_view content);
 
+/// Whether a file could be written, with writeFile's error if not; for before
+/// what takes long. It changes nothing.
+Result<Done> checkWritable(const std::string &path);
+
 /// Writes out what is buffered for the standard output. Each tool calls it
 /// last, for a full disk is seen no sooner.
 Result<Done> finishOutput();

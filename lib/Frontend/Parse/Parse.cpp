@@ -456,9 +456,16 @@ llvm::FailureOr<ParsedFile> piko::parseFile(const ParseRequest &request,
   if (request.text) {
     memory->addFile(request.file, 0,
                     llvm::MemoryBuffer::getMemBufferCopy(*request.text));
-  } else if (!files->exists(request.file)) {
-    mlir::emitError(fileLocation) << "cannot open the file";
-    return llvm::failure();
+  } else {
+    auto status = files->status(request.file);
+    std::error_code problem = status.getError();
+    if (status && status->isDirectory())
+      problem = std::make_error_code(std::errc::is_a_directory);
+    if (problem) {
+      mlir::emitError(fileLocation)
+          << "cannot open the file: " << problem.message();
+      return llvm::failure();
+    }
   }
 
   ClangDiagnosticForwarder forwarder(context);

@@ -6,24 +6,31 @@
 #include "Piko/Target/Processor.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 using piko::CommandLine;
 
 namespace {
 
+/// What a pipeline and its tests' memory may have of anything.
+constexpr int mostOfAll = 1 << 30;
+
 void addCaseOptions(CommandLine &line, Case &into) {
   line.addText("--pipe", "NAME", into.pipe,
                "which pipeline of the file (the only one)");
   line.addNumbers("--domain", "W H ..", 0, into.domain,
-                  "the domain's size (64 48)");
+                  "the domain's size (64 48)", 1, 1073741824);
   line.addNumbers("--count", "N ..", 0, into.counts,
                   "primitives of each source; the last number is for all that "
-                  "follow (1000)");
-  line.addNumber("--elements", "N", into.elements, "of each buffer (64)");
+                  "follow (1000)",
+                  0, mostOfAll);
+  line.addNumber("--elements", "N", into.elements, "of each buffer (64)", 0,
+                 mostOfAll);
   line.addNumber("--seed", "S", into.seed, "of the input (1)");
   line.addNumber("--loop-limit", "N", into.loopLimit,
                  "of hops and rounds (0, as it is)");
@@ -96,7 +103,9 @@ static void addCompilerOptions(CommandLine &line, Options &options) {
       [&](const std::string &text) {
         auto check = piko::parseCheckOptions(text);
         if (!check)
-          throw CLI::ValidationError("expected --check[=nan:RECORD.FIELD,..]");
+          throw CommandLine::wrong("--check", "expected =nan:RECORD.FIELD,.. "
+                                              "or nothing, but got '" +
+                                                  text + "'");
         options.check = *check;
       },
       "checking mode, on both sides");
@@ -140,8 +149,9 @@ static void addTargetOptions(CommandLine &line, Target &one,
       [&](const std::string &name) {
         auto target = piko::parseGPUTarget(name);
         if (!target || *target == piko::GPUTarget::Auto)
-          throw CLI::ValidationError(
-              "expected --target cpu, cuda or gpu-on-cpu");
+          throw CommandLine::wrong("--target", "expected cpu, cuda or "
+                                               "gpu-on-cpu, but got '" +
+                                                   name + "'");
         one.gpu.target = *target;
       },
       "the only target: cpu, gpu-on-cpu or cuda (cpu)");
@@ -157,7 +167,10 @@ static void addTargetOptions(CommandLine &line, Target &one,
       "--gpu-chip", "NAME,..",
       [&](const std::string &names) {
         if (!one.gpu.setChips(names))
-          throw CLI::ValidationError("expected --gpu-chip sm_90,..");
+          throw CommandLine::wrong("--gpu-chip",
+                                   "expected names such as sm_90 between "
+                                   "commas, but got '" +
+                                       names + "'");
       },
       "for cuda: PTX for the oldest of these, cubins for each");
 }
@@ -168,14 +181,15 @@ static void addRunOptions(CommandLine &line, Options &options) {
                "a file with the options of a case in each line, or of C++ in "
                "each line after '// CASE: '");
   line.addNumbers("--threads", "T ..", 0, options.threads,
-                  "numbers of threads (1 2 7)");
-  line.addNumber("--runs", "N", options.runs, "of each number (3)");
+                  "numbers of threads (1 2 7)", 1, 65536);
+  line.addNumber("--runs", "N", options.runs, "of each number (3)", 1,
+                 mostOfAll);
   line.addNumber("--timeout", "SECONDS", options.timeout, "of a case (none)");
   line.addText(
       "--tolerance", "X",
       [&](const std::string &text) {
         options.tolerance =
-            CommandLine::readNumber<double>("--tolerance", text);
+            CommandLine::readNumber<double>("--tolerance", text, 0);
       },
       "relative differences that stages may have which are not strict (any)");
   line.add_flag("--stops", options.stops,
@@ -204,7 +218,7 @@ Options parseOptions(int argc, char **argv) {
   if (!options.help.empty())
     return options;
   if (options.file.empty())
-    throw std::runtime_error("expected a file");
+    throw std::runtime_error("expected a file; see --help");
   if (options.reference.empty())
     options.reference = options.file;
   options.targets = readTargets(targets, one);
@@ -218,20 +232,30 @@ bool hasOwnCases(const Options &options) {
 std::vector<Case> readCases(const Options &options) {
   std::ifstream stream(options.cases);
   if (!stream)
-    throw std::runtime_error("cannot open " + options.cases);
+    throw std::runtime_error("--cases: cannot open '" + options.cases +
+                             "': " + std::generic_category().message(errno));
   const std::string mark = hasOwnCases(options) ? "// CASE: " : "";
   std::vector<Case> cases;
+  int number = 0;
   for (std::string line; std::getline(stream, line);) {
+    ++number;
     if (!line.starts_with(mark))
       continue;
     std::istringstream text(line.substr(mark.size()));
     Case one = options.one;
     CommandLine words("", "");
     addCaseOptions(words, one);
-    read(words, {std::istream_iterator<std::string>(text), {}});
+    try {
+      read(words, {std::istream_iterator<std::string>(text), {}});
+    } catch (const std::runtime_error &error) {
+      throw std::runtime_error("--cases: '" + options.cases + "', line " +
+                               std::to_string(number) + ": " + error.what());
+    }
     cases.push_back(one);
   }
   if (cases.empty())
-    throw std::runtime_error("expected a case in " + options.cases);
+    throw std::runtime_error("--cases: expected a case in a line" +
+                             (mark.empty() ? "" : " after '" + mark + "'") +
+                             " of '" + options.cases + "'");
   return cases;
 }

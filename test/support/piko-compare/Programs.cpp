@@ -12,6 +12,7 @@
 #include "Piko/Target/Object.h"
 #include "Piko/Target/Processor.h"
 #include "ReferenceObject.h"
+#include "Report.h"
 #include "mlir/Bytecode/BytecodeWriter.h"
 #include "mlir/Parser/Parser.h"
 
@@ -28,9 +29,9 @@ class Log {
 public:
   explicit Log(MLIRContext &context) : stream(text), printer(context, stream) {}
   [[noreturn]] void fail(const std::string &what) {
-    std::string message = what + "\n" + text;
+    std::string diagnostics = std::move(text);
     text.clear();
-    throw std::runtime_error(message);
+    throw NotCompiled(what, diagnostics);
   }
 
 private:
@@ -205,9 +206,8 @@ void Programs::Implementation::compileReference(const std::string &file) {
   referenceObject =
       compileReferenceObject(object, referenceDiagnostics, describe);
   if (!referenceObject)
-    throw std::runtime_error("cannot compile " + file +
-                             " for the reference executor\n" +
-                             referenceDiagnostics);
+    throw NotCompiled("cannot compile " + file + " for the reference executor",
+                      referenceDiagnostics);
   reference = ::load({referenceObject->code, referenceObject->headerCode});
 }
 
@@ -353,8 +353,9 @@ Program Programs::reference(const std::string &pipe) {
   const std::vector<std::string> &names = self->referenceObject->pipelines;
   auto found = std::find(names.begin(), names.end(), pipe);
   if (found == names.end())
-    throw std::runtime_error("cannot read " + pipe + "\n" +
-                             self->referenceDiagnostics);
+    throw NotCompiled("cannot read " + pipe + "; expected one of " +
+                          joinNames(names),
+                      self->referenceDiagnostics);
   auto *entry = find<const pikort_program *(int)>(*self->reference,
                                                   "piko_reference_program");
   return {*entry(int(found - names.begin())), self->reference, true};

@@ -12,8 +12,18 @@
 #include "pikort/pikort.h"
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
+
+/// What the compiler said beside what could not be done; what() has both.
+class NotCompiled : public std::runtime_error {
+public:
+  NotCompiled(const std::string &what, const std::string &diagnostics)
+      : runtime_error(what + "\n" + diagnostics), reason(what),
+        diagnostics(diagnostics) {}
+  std::string reason, diagnostics;
+};
 
 /// Code and the program in it; the code goes with the object.
 struct Program {

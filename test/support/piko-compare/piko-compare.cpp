@@ -24,9 +24,12 @@
 #include "Report.h"
 #include "Run.h"
 
+#include "Piko/CommandLine/Messages.h"
 #include "Piko/CommandLine/Progress.h"
 #include "Piko/Driver/DeepStack.h"
 #include "Piko/Replay/Measure.h"
+#include "Piko/Support/OutOfMemory.h"
+#include "Piko/Support/OutputFile.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -209,7 +212,8 @@ bool compareAll(const Options &options) {
     if (!input.pipe.empty())
       return;
     if (names.size() != 1)
-      throw std::runtime_error("expected the name of a pipeline");
+      throw std::runtime_error(
+          "--pipe: expected one of the file's pipelines: " + joinNames(names));
     input.pipe = names[0];
   };
   if (options.cases.empty()) {
@@ -237,22 +241,40 @@ bool compareAll(const Options &options) {
 
 } // namespace
 
+/// Says what went wrong, where that has no place of its own. A difference has the status
+/// 1.
+static int fail(const std::string &message) {
+  std::string lines = piko::addToolName("piko-compare", message);
+  std::fputs(lines.c_str(), stderr);
+  return 2;
+}
+
+/// The exit status, once all is written.
+static int finish(int status) {
+  auto ok = piko::support::finishOutput();
+  return ok ? status : fail("error: " + ok.error().message);
+}
+
 /// Returns the exit status.
 static int run(int argc, char **argv) {
   try {
     Options options = parseOptions(argc, argv);
     if (!options.help.empty()) {
       std::fputs(options.help.c_str(), stdout);
-      return 0;
+      return finish(0);
     }
-    return compareAll(options) ? 0 : 1;
+    return finish(compareAll(options) ? 0 : 1);
+  } catch (const NotCompiled &error) {
+    return fail(error.diagnostics + "error: " + error.reason);
+  } catch (const std::bad_alloc &) {
+    piko::support::endOutOfMemory();
   } catch (const std::exception &error) {
-    std::fprintf(stderr, "piko-compare: %s\n", error.what());
-    return 2;
+    return fail(std::string("error: ") + error.what());
   }
 }
 
 int main(int argc, char **argv) {
+  piko::support::reportOutOfMemory("piko-compare");
   // More threads than cores: to wait must not cost time.
   setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
   return piko::runMainOnDeepStack([&] { return run(argc, argv); });

@@ -23,8 +23,10 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <cctype>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <sys/resource.h>
 
@@ -118,10 +120,22 @@ std::string messageOf(const Assimp::Importer &importer) {
   std::string message = importer.GetErrorString();
   if (size_t end = message.find('\n'); end != std::string::npos)
     message.resize(end);
+  while (message.ends_with('.'))
+    message.pop_back();
+  // Of a sentence; names of formats stay as they are.
+  if (message.size() > 1 &&
+      std::islower(static_cast<unsigned char>(message[1])))
+    message[0] = char(std::tolower(static_cast<unsigned char>(message[0])));
   return message.empty() ? "no importer reads it" : message;
 }
 
 Result<Mesh> import(const std::string &path) {
+  std::error_code problem;
+  if (auto status = std::filesystem::status(path, problem);
+      !std::filesystem::exists(status))
+    return Error{problem.message()};
+  else if (std::filesystem::is_directory(status))
+    return Error{"it is a folder"};
   Assimp::Importer importer;
   const aiScene *imported;
   // Other formats may consist of several files, which the importer finds.

@@ -83,13 +83,15 @@ public:
   template <class T>
   CLI::Option *addNumbers(const std::string &name, const std::string &value,
                           int count, std::vector<T> &numbers,
-                          const std::string &description) {
+                          const std::string &description,
+                          std::type_identity_t<T> least = lowest<T>,
+                          std::type_identity_t<T> most = highest<T>) {
     return addValues(
         name, value, count,
         [=, &numbers](const Words &texts) {
           numbers.clear();
           for (const std::string &text : texts)
-            numbers.push_back(readNumber<T>(name, text));
+            numbers.push_back(readNumber<T>(name, text, least, most));
         },
         description);
   }

@@ -8,6 +8,7 @@
 #define PIKO_COMMANDLINE_MESSAGES_H
 
 #include <string>
+#include <vector>
 
 namespace piko {
 
@@ -15,6 +16,13 @@ namespace piko {
 /// ..." becomes "pikoc: error: ...". The last line is ended.
 std::string addToolName(const std::string &tool,
                         const std::string &diagnostics);
+
+/// What LLVM's command line says of words that it does not take, as tools say
+/// it: "TOOL: Unknown command line argument '--a'.  Try: 'TOOL --help'" becomes
+/// "unknown option '--a'; did you mean '--b'?". `options` are all that there
+/// are, with dashes.
+std::string rewordProblem(const std::string &tool, const std::string &said,
+                          const std::vector<std::string> &options);
 
 } // namespace piko
 
