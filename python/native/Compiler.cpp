@@ -126,11 +126,21 @@ private:
 
 } // namespace
 
+/// They quote lines of files, which may be anything.
+static py::str toText(const std::string &bytes) {
+  PyObject *text = PyUnicode_DecodeUTF8(
+      bytes.data(), static_cast<Py_ssize_t>(bytes.size()), "replace");
+  if (!text)
+    throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(text);
+}
+
 void piko::python::defineCompiler(py::module_ &module) {
   py::class_<Job, std::shared_ptr<Job>>(module, "Job")
       .def("wait", &Job::wait, py::call_guard<py::gil_scoped_release>())
       .def_readonly("status", &Job::status)
-      .def_readonly("diagnostics", &Job::diagnostics)
+      .def_property_readonly(
+          "diagnostics", [](const Job &job) { return toText(job.diagnostics); })
       .def("result", [](Job &job) {
         return job.status == PIKO_OK && job.result ? job.result() : py::none();
       });
@@ -149,7 +159,8 @@ void piko::python::defineCompiler(py::module_ &module) {
       .def("set_file", &Compiler::setFile)
       .def("set_text", &Compiler::setText)
       .def("set_option", &Compiler::setOption)
-      .def("diagnostics", &Compiler::diagnostics)
+      .def("diagnostics",
+           [](const Compiler &it) { return toText(it.diagnostics()); })
       .def("tuned_mappings", &Compiler::tunedMappings)
       .def("tuned_strip_size", &Compiler::tunedStripSize)
       .def("load", &Compiler::load)

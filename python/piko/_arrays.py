@@ -181,9 +181,12 @@ def convert(value: Any, dtype: DType) -> Array:
     does not fit, or a fraction would be lost."""
     if isinstance(value, np.ndarray) and value.dtype == dtype:
         return np.ascontiguousarray(value)
-    array = np.array(value, order="C")
-    with np.errstate(over="ignore", invalid="ignore"):
-        made = array.astype(dtype)
+    try:
+        array = np.array(value, order="C")
+        with np.errstate(over="ignore", invalid="ignore"):
+            made = array.astype(dtype)
+    except (TypeError, ValueError):
+        raise ValueError(f"expected numbers of type {dtype}, but got {value!r}") from None
     if dtype.kind in "iu" and array.dtype.kind in "iufb" and not (made == array).all():
         raise ValueError(f"expected numbers of type {dtype}, but got {value!r}")
     return made
@@ -193,7 +196,13 @@ def assign(to: Array, value: Any, path: str = "") -> None:
     """Sets numbers or records; of a mapping, the fields that it has. ValueError or
     TypeError where that cannot be."""
     if not to.dtype.fields:
-        to[...] = convert(value, to.dtype)
+        numbers = convert(value, to.dtype)
+        try:
+            to[...] = numbers
+        except ValueError:
+            raise ValueError(
+                f"expected shape {to.shape}, but got {numbers.shape}"
+            ) from None
     elif isinstance(value, Mapping):
         for name, part in value.items():
             inner = f"{path}.{name}" if path else str(name)

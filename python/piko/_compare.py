@@ -155,8 +155,8 @@ def compare(
     """
     if not isinstance(pipe, Pipeline):
         raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
-    if tolerance < 0:
-        raise ValueError("expected a tolerance of at least 0")
+    if not tolerance >= 0:
+        raise ValueError(f"expected a tolerance of at least 0, but got {tolerance}")
     with Progress(f"comparing {pipe.name} with {against}"):
         return _compare(pipe, against, tolerance)
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from dataclasses import dataclass
@@ -94,7 +95,9 @@ class _Options:
 
 def _check_argument(status: int, compiler: _core.Compiler) -> None:
     if status:
-        raise ValueError(compiler.diagnostics().removeprefix("error: ").rstrip("\n"))
+        said = compiler.diagnostics().removeprefix("error: ").rstrip("\n")
+        # As pikoc says it.
+        raise ValueError(re.sub(r"^(option '([\w-]+)': )--\2: ", r"\1", said))
 
 
 _INVALID_ARGUMENT, _OUT_OF_MEMORY = 1, 3
@@ -128,7 +131,20 @@ def _result(job: _core.Job, what: str) -> Any:
 def _list_of(key: str, values: Iterable[Any]) -> List[Any]:
     if isinstance(values, str):
         raise TypeError(f"{key}: expected a list, but got a string")
-    return list(values)
+    try:
+        return list(values)
+    except TypeError:
+        kind = type(values).__name__
+        raise TypeError(f"{key}: expected a list, but got {kind}") from None
+
+
+def _is_unicode(text: str) -> bool:
+    """Not of surrogates, which stand for bytes that are no text."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 class _Settings:
@@ -138,8 +154,12 @@ class _Settings:
         self.found: List[Tuple[str, str]] = []
 
     def add(self, key: str, value: object) -> None:
-        if value is not None:
-            self.found.append((key, _text_of(value)))
+        if value is None:
+            return
+        text = _text_of(value)
+        if "\0" in text or not _is_unicode(text):
+            raise ValueError(f"option '{key}': expected a text, but got {text!r}")
+        self.found.append((key, text))
 
     def add_all(self, key: str, values: Iterable[object]) -> None:
         for value in _list_of(key, values):
@@ -158,16 +178,21 @@ class _Settings:
             self.add_pairs("define", defines)
         else:
             self.add_all("define", defines)
-        self.add_all("include-dir", [os.fspath(folder) for folder in include_dirs])
+        folders = _list_of("include_dirs", include_dirs)
+        self.add_all("include-dir", [os.fspath(folder) for folder in folders])
 
     def of(self, source: Source, name: Optional[str]) -> _Options:
-        text = os.fspath(source)
+        text = os.fspath(source) if hasattr(source, "__fspath__") else source
         if not isinstance(text, str):
             kind = type(source).__name__
             raise TypeError(f"expected a path or a text, but got {kind}")
         if not text:
             raise ValueError("expected a path or a text, but got an empty one")
         is_text = isinstance(source, str) and "\n" in source
+        if not is_text and "\0" in text:
+            raise ValueError(f"expected a path, but got {text!r}")
+        if not _is_unicode(text):
+            raise ValueError("expected a text or a path of Unicode, but got surrogates")
         return _Options(text, is_text, name or "pipeline.piko.cpp", tuple(self.found))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from . import _core
 from ._arrays import Bound, DeviceArray, assign, take_array, view_of
 from ._compile import Program, Source, compile
-from ._errors import RunError
+from ._errors import RunError, Status
 from ._progress import Progress
 from ._records import DType, make_dtype
 from ._stats import Stats, read_stats
@@ -136,7 +136,7 @@ class Pipeline:
         if program._tuned_strip_size:
             self._check(self._core.set_strip_size(program._tuned_strip_size))
         if domain is not None:
-            self.domain = tuple(domain)
+            self.domain = domain  # type: ignore[assignment]
         if threads is not None:
             self.threads = threads
         for name, value in others.items():
@@ -261,6 +261,9 @@ class Pipeline:
     @domain.setter
     def domain(self, extent: Iterable[int]) -> None:
         self._use()
+        if not isinstance(extent, Iterable):
+            kind = type(extent).__name__
+            raise TypeError(f"domain: expected a cell count for each dimension, but got {kind}")
         cells = [_number("domain", cell) for cell in extent]
         self._check(self._core.set_domain(cells))
         self._domain = tuple(cells)
@@ -273,7 +276,11 @@ class Pipeline:
     @threads.setter
     def threads(self, count: int) -> None:
         self._use()
-        self._check(self._core.set_threads(_number("threads", count)))
+        number = _number("threads", count)
+        if number >= 2**31:  # the runtime has no words for it
+            said = f"expected a number of threads in [0, 10000], but got {number}"
+            raise RunError(Status.INVALID_ARGUMENT, said)
+        self._check(self._core.set_threads(number))
 
     def set_memory_limit(self, bytes: int) -> None:
         """Limits all memory; 0 = no limit. A run that needs more is a RunError."""
@@ -386,8 +393,13 @@ class Pipeline:
         if state.kind != "buffer":
             raise TypeError(f"'{name}' is {state.kind}, not a buffer")
         self._refuse_views(state, "allocated anew")
-        self._check(self._core.allocate(name, _number("allocate", count)))
-        state.bound = None
+        status = self._core.allocate(name, _number("allocate", count))
+        error = RunError(status, self._core.message()) if status else None
+        # Without memory for the new records the old ones are gone, too.
+        if not error or not {one[0]: one[5] for one in self._core.states()}[name]:
+            state.bound = None
+        if error:
+            raise error
         return self._view(state)
 
     def feed(self, source: Union[str, int], primitives: Any) -> None:

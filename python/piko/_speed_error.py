@@ -369,6 +369,9 @@ def _check_arguments(
         known = ", ".join(_METRICS)
         raise ValueError(f"metric: expected one of {known}, but got '{metric}'")
     for name, count in counts.items():
+        if not isinstance(count, int):
+            kind = type(count).__name__
+            raise TypeError(f"{name}: expected an integer, but got {kind}")
         if count < 1:
             raise ValueError(f"{name}: expected at least 1, but got {count}")
 
@@ -408,6 +411,8 @@ def speed_error(
     """
     counts = {"rounds": rounds, "frames": frames}
     _check_arguments(pipe, variants, reference, metric, counts)
+    if not seconds >= 0:
+        raise ValueError(f"seconds: expected at least 0, but got {seconds}")
     maker = _Maker(pipe, setup, common)
     right, described = {"target": "reference"}, _OWN
     if isinstance(reference, str):

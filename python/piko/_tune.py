@@ -110,6 +110,8 @@ def tune(
     """
     if not isinstance(pipe, Pipeline):
         raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
+    if isinstance(space, str):
+        raise TypeError("space: expected a list, but got a string")
     program = pipe.program
     command = [os.fspath(tool) if tool is not None else _find_tool()]
     folder = tempfile.mkdtemp(prefix="piko-tune-")
@@ -139,7 +141,7 @@ def tune(
         kept = _keep(text)
         return _read(text, json.loads(done.stdout.splitlines()[-1]), kept)
     except OSError as problem:
-        raise TuneError(f"cannot run piko-tune: {problem}") from None
+        raise TuneError(f"cannot run piko-tune, '{command[0]}': {problem.strerror}") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
