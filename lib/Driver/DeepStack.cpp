@@ -14,6 +14,7 @@
 
 #include <cerrno>
 #include <csetjmp>
+#include <cstdlib>
 #include <mutex>
 #include <system_error>
 
@@ -75,8 +76,12 @@ static void endOutOfMemory(void *, const char *, bool) {
   piko::support::endOutOfMemory();
 }
 
+/// Whether the process is a program's, which ends where LLVM gets no memory.
+static bool isProgram = false;
+
 int piko::runMainOnDeepStack(llvm::function_ref<int()> main) {
   llvm::install_bad_alloc_error_handler(endOutOfMemory);
+  isProgram = true;
   int status = 1;
   runOnDeepStack([&] { status = main(); });
   return status;
@@ -91,15 +96,21 @@ class FatalErrors {
 public:
   FatalErrors() {
     std::lock_guard lock(mutex);
-    if (users++ == 0)
-      llvm::install_fatal_error_handler(handle);
+    if (users++ != 0)
+      return;
+    llvm::install_fatal_error_handler(handle);
+    if (!isProgram)
+      llvm::install_bad_alloc_error_handler(handleBadAlloc);
   }
   FatalErrors(const FatalErrors &) = delete;
   FatalErrors &operator=(const FatalErrors &) = delete;
   ~FatalErrors() {
     std::lock_guard lock(mutex);
-    if (--users == 0)
-      llvm::remove_fatal_error_handler();
+    if (--users != 0)
+      return;
+    llvm::remove_fatal_error_handler();
+    if (!isProgram)
+      llvm::remove_bad_alloc_error_handler();
   }
 
   /// Where `function` is left `why` says why.
@@ -120,6 +131,16 @@ private:
       return; // LLVM ends the process
     }
     *reason = text;
+    longjmp(*here, 1);
+  }
+
+  /// As LLVM does it by itself, where no call is contained.
+  static void handleBadAlloc(void *, const char *text, bool) {
+    if (!here) {
+      llvm::errs() << "LLVM ERROR: out of memory: " << text << "\n";
+      std::abort();
+    }
+    *reason = "out of memory"; // so short a text needs none
     longjmp(*here, 1);
   }
 

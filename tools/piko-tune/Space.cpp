@@ -163,9 +163,12 @@ static std::optional<Space> readSpaceHere(const TuneOptions &options,
 std::optional<Space> tune::readSpace(const TuneOptions &options,
                                      std::string &diagnostics) {
   std::optional<Space> space;
-  runOnDeepStack(
+  auto failed = runContained(
       [&]() -> void { space = readSpaceHere(options, diagnostics); });
-  return space;
+  if (!failed)
+    return space;
+  diagnostics += "error: " + *failed + "\n";
+  return std::nullopt;
 }
 
 std::string tune::getProcessorName() {
