@@ -6,7 +6,7 @@ format    every C++ file is formatted as .clang-format says (--fix: make it so)
 licence   every source file has the licence line at its top
 paths     no file holds an absolute path of somebody's machine
 layers    the runtime's common part knows nothing of the targets' parts, nor the
-          CPU's of CUDA's; no library includes a file of another one by its path
+          CPU's of a device's; no library includes a file of another one by its path
 folders   none has more files than a reader looks through
 classes   none has more functions than that
 words     terms are the field's: none of those of utils/words.txt
@@ -106,7 +106,8 @@ def paths():
 def layers():
     """runtime/common includes none of runtime/cpu, runtime/gpu and runtime/cuda,
     and declares none of the first two's types itself; those two include nothing
-    of runtime/cuda. No library includes a file of another one by its path."""
+    of runtime/cuda, and runtime/cpu nothing of runtime/gpu, nor does it name an
+    accelerator. No library includes a file of another one by its path."""
     runtime = ROOT / "runtime"
     foreign = set()
     for header in [*runtime.glob("cpu/**/*.h"), *runtime.glob("gpu/**/*.h")]:
@@ -131,6 +132,14 @@ def layers():
                 print(
                     f"{path.relative_to(ROOT)}:{number}: expected nothing of"
                     " runtime/cuda in what runs without it"
+                )
+                faults += 1
+            if path.is_relative_to(runtime / "cpu") and re.search(
+                r'#include "(gpu/|common/Accelerator)|\b[Aa]ccelerator\b', line
+            ):
+                print(
+                    f"{path.relative_to(ROOT)}:{number}: expected nothing of a device"
+                    " in runtime/cpu"
                 )
                 faults += 1
     for path in sorted(runtime.glob("common/*")):

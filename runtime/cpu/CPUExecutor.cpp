@@ -5,7 +5,6 @@
 #include "cpu/check/Check.h"
 #include "cpu/loops/Cycle.h"
 #include "cpu/loops/Strips.h"
-#include "cpu/state/Mirrors.h"
 
 #include <algorithm>
 
@@ -62,7 +61,7 @@ void CPUExecutor::prepare() {
 
 void CPUExecutor::beginRun() {
   prepareState(p);
-  beginMirrors(p, takesWhole());
+  showState();
   startCounters(p);
   p.profile.enter(Part::Program);
   if (checker)
@@ -73,6 +72,8 @@ void CPUExecutor::beginRun() {
   startCycles(p);
   startStrips(p);
 }
+
+const pikoir_input *CPUExecutor::show(Kernel &kernel) { return &kernel.input; }
 
 int32_t CPUExecutor::runProgram() { return p.runProgram(&p); }
 
@@ -85,7 +86,7 @@ void CPUExecutor::clearKernels() {
 
 void CPUExecutor::endRun() {
   endClears(p);
-  endMirrors(p);
+  takeState();
   endStrips(p);
   endCycles(p);
   if (checker)

@@ -18,6 +18,7 @@
 namespace piko::rt {
 
 class Checker;  // Check.h
+struct Items;   // Kernel.h
 struct Kernel;  // Kernel.h
 struct Queue;   // Queue.h
 class Cycle;    // Cycle.h
@@ -36,15 +37,27 @@ struct CPUExecutor : Executor {
   void beginRun() override;
   int32_t runProgram() override;
   void endRun() override;
-  /// Whether a device takes the run as a whole, as far as is known.
-  virtual bool takesWhole() const { return false; }
   /// Drops what kernels hold of a run.
   void clearKernels();
   bool reportsInOrder() const override { return checker != nullptr; }
   void noteError() override;
   std::string describe(int32_t code, const std::string &plain) const override;
 
+  // --- what kernels see: here, what there is
+  /// Before the program runs: lets kernels reach state and sources; throws.
+  virtual void showState() {}
+  /// After it: state and sources are the host's again, with what kernels have
+  /// written.
+  virtual void takeState() {}
+  /// Of a serial launch, whose primitives lie in `from`; throws.
+  virtual void showSerial(Kernel &, const Items &from) {}
+  /// The input of a kernel that is ready to run; throws.
+  virtual const pikoir_input *show(Kernel &kernel);
+
   pikort_pipeline &p;
+  /// How many units run at once where blocks of threads run them; 0: a thread
+  /// runs a unit.
+  int64_t blocksAtOnce = 0;
   // Warm from run to run:
   std::vector<std::unique_ptr<Kernel>> kernels; ///< Of stages.
   /// Of sources; null where the consumer is not placed.

@@ -176,20 +176,11 @@ struct Stream : Items {
   std::vector<Array<uint8_t>> blocks;
 };
 
-/// What an accelerator sees of an input that lies elsewhere.
-struct InputMirrors {
-  Array<uint8_t> items;
-  Array<uint32_t> order;
-  Array<pikoir_unit> units;
-  Array<pikoir_call> calls;
-  Array<pikoir_input> input; ///< What generated code sees, from run to run.
-
-  void clear() {
-    items = {};
-    order = {};
-    units = {};
-    calls = {};
-  }
+/// What the executor has of a kernel's input where kernels cannot read ours.
+struct InputMirror {
+  virtual ~InputMirror() = default;
+  /// Frees what a run holds.
+  virtual void clear() = 0;
 };
 
 /// How far the units of each owner have been given to threads.
@@ -223,7 +214,7 @@ struct Kernel {
   // From begin to end.
   Stream stream;
   pikoir_input input{};
-  InputMirrors mirrors;
+  std::unique_ptr<InputMirror> mirror; ///< Null: generated code sees `input`.
 
   // From begin until all outputs are gathered.
   Array<int64_t> offsets;

@@ -4,7 +4,6 @@
 #include "cpu/check/Check.h"
 #include "cpu/loops/Cycle.h"
 #include "cpu/loops/Strips.h"
-#include "cpu/state/Mirrors.h"
 #include "cpu/state/PrivateCopies.h"
 #include "cpu/state/PrivateImages.h"
 
@@ -28,7 +27,8 @@ void Kernel::clear() {
   keys = {};
   counts.clear();
   units.clear();
-  mirrors.clear();
+  if (mirror)
+    mirror->clear();
   for (auto &lane : lanes)
     lane->clear();
   firstRound = true;
@@ -57,7 +57,6 @@ static void publish(pikort_pipeline &p, Kernel &kernel) {
                   /*clears=*/0,
                   /*cursors=*/nullptr,
                   /*homes=*/0};
-  shareUnits(p, kernel);
 }
 
 static void openLanes(pikort_pipeline &p, Kernel &kernel) {
@@ -202,11 +201,10 @@ static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
   else
     kernel.begun =
         p.profile.enter(code == PIKORT_OK ? Part::Kernel : Part::Program);
+  const pikoir_input *input = nullptr;
   if (code == PIKORT_OK)
-    code = guarded(&p, nameOf(p, kernel), [&] { shareHeader(p, kernel); });
-  return code != PIKORT_OK ? nullptr
-         : p.accelerator   ? kernel.mirrors.input.data()
-                           : &kernel.input;
+    guarded(&p, nameOf(p, kernel), [&] { input = cpuOf(p).show(kernel); });
+  return input;
 }
 
 /// Counts what a launch over threads emitted and how long they waited, and

@@ -2,7 +2,6 @@
 //===- Serial.cpp - Launches that are too small for threads ---------------===//
 
 #include "cpu/Serial.h"
-#include "cpu/state/Mirrors.h"
 
 #include <algorithm>
 
@@ -138,7 +137,7 @@ void Serial::begin(const Items &input) {
                    /*clears=*/0,
                    /*cursors=*/nullptr,
                    /*homes=*/0};
-  shareInput(p_, kernel_, input);
+  cpuOf(p_).showSerial(kernel_, input);
 }
 
 void Serial::binPairs(const Items &input) {

@@ -4,11 +4,29 @@
 #include "cuda/CudaExecutor.h"
 #include "cpu/loops/Cycle.h"
 #include "cpu/loops/Strips.h"
-#include "cpu/state/Mirrors.h"
+#include "cuda/Accelerator.h"
 #include "cuda/frame/ProgramCheck.h"
+#include "gpu/Mirrors.h"
 
 using namespace piko::cuda;
 using namespace piko::rt;
+
+CudaExecutor::CudaExecutor(pikort_pipeline &p, Accelerator &device)
+    : CPUExecutor(p), frame_(p, device) {
+  blocksAtOnce = device.residentThreads() / 64;
+}
+
+void CudaExecutor::showState() { beginMirrors(p, takesWhole()); }
+
+void CudaExecutor::takeState() { endMirrors(p); }
+
+void CudaExecutor::showSerial(Kernel &kernel, const Items &from) {
+  shareInput(p, kernel, from);
+}
+
+const pikoir_input *CudaExecutor::show(Kernel &kernel) {
+  return shareKernel(p, kernel);
+}
 
 void CudaExecutor::prepare() {
   checkProgram(p, program_);

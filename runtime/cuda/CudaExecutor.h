@@ -18,8 +18,7 @@ namespace piko::cuda {
 
 class CudaExecutor final : public rt::CPUExecutor {
 public:
-  CudaExecutor(pikort_pipeline &p, Accelerator &device)
-      : CPUExecutor(p), frame_(p, device) {}
+  CudaExecutor(pikort_pipeline &p, Accelerator &device);
 
   /// In the setup: what the program does.
   void setProgram(Steps program) { program_ = program; }
@@ -34,9 +33,12 @@ public:
   void endRun() override;
 
 private:
-  bool takesWhole() const override {
-    return !program_.empty() && frame_.isPossible();
-  }
+  void showState() override;
+  void takeState() override;
+  void showSerial(rt::Kernel &kernel, const rt::Items &from) override;
+  const pikoir_input *show(rt::Kernel &kernel) override;
+  /// Whether the device takes the run as a whole, as far as is known.
+  bool takesWhole() const { return !program_.empty() && frame_.isPossible(); }
   void record();
   /// Runs the program step by step, for a frame that could not.
   int32_t repeatProgram(DeviceFrame::Outcome outcome);

@@ -14,7 +14,6 @@
 
 #include "common/JoinRules.h"
 #include "cpu/Kernel.h"
-#include "cpu/state/Mirrors.h"
 
 #include <algorithm>
 #include <atomic>
@@ -36,9 +35,8 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
                  const BinSchedule &schedule, int64_t positions) {
   if (schedule.tileSplit > 0 && !stage.sharesTile)
     return schedule.tileSplit;
-  if (p.accelerator)
-    return piko::join::blockUnitSize(0, positions,
-                                     p.accelerator->residentThreads() / 64);
+  if (int64_t blocks = cpuOf(p).blocksAtOnce)
+    return piko::join::blockUnitSize(0, positions, blocks);
   int64_t share = positions / (int64_t(p.threads) * 8);
   // One of a few primitives may have most of the domain's pixels.
   int64_t most = stage.selections.empty() ? 1024 : 64;
@@ -48,10 +46,9 @@ int64_t unitSize(const pikort_pipeline &p, const Stage &stage,
 /// Buckets or calls in a unit, at most `most`. A block takes one after the
 /// other, so that few in each keep all multiprocessors busy.
 int64_t mostTogether(const pikort_pipeline &p, int64_t count, int64_t most) {
-  if (!p.accelerator)
-    return most;
-  int64_t blocks = 4 * p.accelerator->residentThreads() / 64;
-  return std::clamp<int64_t>(count / blocks, 1, most);
+  int64_t blocks = cpuOf(p).blocksAtOnce;
+  return blocks == 0 ? most
+                     : std::clamp<int64_t>(count / (4 * blocks), 1, most);
 }
 
 class Cutter {

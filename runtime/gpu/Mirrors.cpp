@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Mirrors.cpp - What a device sees of the host's memory --------------===//
 
-#include "cpu/state/Mirrors.h"
+#include "gpu/Mirrors.h"
 #include "cpu/Parallel.h"
 
 using namespace piko::rt;
@@ -125,8 +125,6 @@ static void beginMirror(pikort_pipeline &p, Source &source) {
 }
 
 void piko::rt::beginMirrors(pikort_pipeline &p, bool isFrame) {
-  if (!p.accelerator)
-    return;
   if (isFrame)
     return beginFrame(p);
   // What the host copies is what the stream has left there.
@@ -181,7 +179,7 @@ void piko::rt::endMirrors(pikort_pipeline &p) {
   for (State &state : p.states)
     if (state.hosts)
       endMirror(p, state);
-  if (p.accelerator && p.status != PIKORT_DEVICE_FAILED)
+  if (p.status != PIKORT_DEVICE_FAILED)
     guarded(&p, "run", [&] { p.accelerator->finishStream(); });
   for (Source &source : p.sources)
     if (source.hosts)
@@ -189,6 +187,32 @@ void piko::rt::endMirrors(pikort_pipeline &p) {
 }
 
 // --- Input of kernels -------------------------------------------------------
+
+namespace {
+
+/// Of an input that lies elsewhere.
+struct InputCopies final : InputMirror {
+  Array<uint8_t> items;
+  Array<uint32_t> order;
+  Array<pikoir_unit> units;
+  Array<pikoir_call> calls;
+  Array<pikoir_input> input; ///< What generated code sees, from run to run.
+
+  void clear() override {
+    items = {};
+    order = {};
+    units = {};
+    calls = {};
+  }
+};
+
+} // namespace
+
+static InputCopies &copiesOf(Kernel &kernel) {
+  if (!kernel.mirror)
+    kernel.mirror = std::make_unique<InputCopies>();
+  return static_cast<InputCopies &>(*kernel.mirror);
+}
 
 /// Lets `data` point to a copy of its elements.
 template <class T>
@@ -202,33 +226,24 @@ static void share(pikort_pipeline &p, Array<T> &mirror, const T *&data,
   data = mirror.data();
 }
 
-void piko::rt::shareUnits(pikort_pipeline &p, Kernel &kernel) {
-  pikoir_input &input = kernel.input;
-  if (p.accelerator)
-    share(p, kernel.mirrors.units, input.units, input.unit_count);
-}
-
-void piko::rt::shareHeader(pikort_pipeline &p, Kernel &kernel) {
-  if (!p.accelerator)
-    return;
-  Array<pikoir_input> &shared = kernel.mirrors.input;
-  if (!shared)
-    shared = Array<pikoir_input>(p.memory, 1, Use::State);
-  shared[0] = kernel.input;
-}
-
 void piko::rt::shareInput(pikort_pipeline &p, Kernel &kernel,
                           const Items &from) {
-  if (!p.accelerator)
-    return;
   pikoir_input &input = kernel.input;
-  InputMirrors &mirrors = kernel.mirrors;
-  shareUnits(p, kernel);
+  InputCopies &copies = copiesOf(kernel);
   // What has an index lies in blocks of the pipeline's memory, which may be far
   // from each other.
   if (!from.index)
-    share(p, mirrors.items, input.items,
+    share(p, copies.items, input.items,
           from.count * p.records[p.stages[kernel.stage].record].size);
-  share(p, mirrors.order, input.order, input.count);
-  share(p, mirrors.calls, input.calls, input.call_count);
+  share(p, copies.order, input.order, input.count);
+  share(p, copies.calls, input.calls, input.call_count);
+}
+
+const pikoir_input *piko::rt::shareKernel(pikort_pipeline &p, Kernel &kernel) {
+  InputCopies &copies = copiesOf(kernel);
+  share(p, copies.units, kernel.input.units, kernel.input.unit_count);
+  if (!copies.input)
+    copies.input = Array<pikoir_input>(p.memory, 1, Use::State);
+  copies.input[0] = kernel.input;
+  return copies.input.data();
 }

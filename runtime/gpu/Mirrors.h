@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //===- Mirrors.h - What a device sees of the host's memory ----------------===//
 
-#ifndef PIKO_RUNTIME_CPU_MIRRORS_H
-#define PIKO_RUNTIME_CPU_MIRRORS_H
+#ifndef PIKO_RUNTIME_GPU_MIRRORS_H
+#define PIKO_RUNTIME_GPU_MIRRORS_H
 
 #include "cpu/Kernel.h"
 
 namespace piko::rt {
 
-/// Where kernels run on an accelerator: puts memory that they reach in the
+/// Of a pipeline with an accelerator: puts memory that kernels reach in the
 /// place of constants, buffers, sources and images; throws. For a frame, of
 /// which the host touches nothing until it has ended, that is the device's own,
 /// and copies are in the order of its stream. For the host's way it is the
@@ -19,12 +19,13 @@ void refillMirrors(pikort_pipeline &p);
 /// Puts the host's memory back, with what kernels have written.
 void endMirrors(pikort_pipeline &p);
 
-/// Lets an accelerator read a kernel's units, or all of its input, whose
-/// primitives are those of `from`; throws.
-void shareHeader(pikort_pipeline &p, Kernel &kernel);
-void shareUnits(pikort_pipeline &p, Kernel &kernel);
+/// Puts copies in the place of what is the host's alone of the input of a
+/// serial launch, whose primitives are those of `from`; throws.
 void shareInput(pikort_pipeline &p, Kernel &kernel, const Items &from);
+/// The input of a kernel that is ready to run, as the accelerator reads it;
+/// throws.
+const pikoir_input *shareKernel(pikort_pipeline &p, Kernel &kernel);
 
 } // namespace piko::rt
 
-#endif // PIKO_RUNTIME_CPU_MIRRORS_H
+#endif // PIKO_RUNTIME_GPU_MIRRORS_H
