@@ -74,9 +74,15 @@ bool piko::testdriver::parseLatencies(
       return false;
     at = next;
   }
-  if (at == end)
-    latencies = read;
-  return at == end;
+  if (at != end) {
+    auto [next, error] = *at == ','
+                             ? std::from_chars(at + 1, end, read.cacheBytes)
+                             : std::from_chars_result{at, std::errc()};
+    if (error != std::errc() || next != end || read.cacheBytes == 0)
+      return false;
+  }
+  latencies = read;
+  return true;
 }
 
 /// What the environment says cannot be taken: a test would not be what it says.
@@ -104,8 +110,8 @@ State::State() {
   if (const char *cycles = std::getenv("PIKO_TEST_DRIVER_LATENCIES"))
     if (!parseLatencies(cycles, latencies))
       refuse("PIKO_TEST_DRIVER_LATENCIES",
-             "expected four numbers of cycles with commas between them, but "
-             "got '" +
+             "expected four numbers of cycles, and perhaps one of bytes, with "
+             "commas between them, but got '" +
                  std::string(cycles) + "'");
   failures = parseFailures(std::getenv("PIKO_TEST_DRIVER_FAIL"));
 }

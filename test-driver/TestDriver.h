@@ -96,8 +96,9 @@ struct PikoTestDriverCounts {
   /// PIKO_TEST_DRIVER_LATENCIES. Each warp issues its instructions in order,
   /// one a cycle, as if it were alone, and waits for what they read; blocks
   /// wait for room. Loads of global memory find it in the first-level cache
-  /// where the launch has touched it before; or where their block has, unless
-  /// what has the same place in 8 KB came between, or a fence.
+  /// where the launch has touched it since their block's latest fence; or where
+  /// their block has, unless what has the same place in its part of the cache
+  /// came between.
   uint64_t leastSpan, mostSpan;
   // Warp instructions by class. Divisions are those that GPUs do by a sequence
   // of instructions, as are remainders and correctly rounded roots.
@@ -158,7 +159,10 @@ int pikoTestDriverModes(const char *names);
 /// Lets spans be counted. Cycles from issue until a result is there, as
 /// "arithmetic,shared,hit,miss": of an arithmetic instruction and of loads from
 /// shared memory, from the first-level cache and from the second one; empty:
-/// counts none. Returns 1 where that is no text of four positive numbers.
+/// counts none. After them may come the bytes that a multiprocessor's
+/// first-level cache and shared memory have together, of which blocks that are
+/// there at the same time have equal parts; without, a block has 8 KB. Returns
+/// 1 where that is no text of four positive numbers, or five.
 int pikoTestDriverLatencies(const char *cycles);
 
 /// The names of kernels that were launched, a line each, sorted.

@@ -85,13 +85,15 @@ void runKernel(const Call &call, const Kernel &kernel,
   launch.conditions = conditions;
   if (state().latencies)
     launch.latencies = &*state().latencies;
-  const auto &threads = kernel.threads;
-  launch.resident = static_cast<uint64_t>(
-      state().multiprocessors *
-      std::max(1, residentBlocks(
-                      function.program,
-                      static_cast<int>(threads[0] * threads[1] * threads[2]),
-                      kernel.sharedBytes)));
+  const auto &threads = kernel.threads, &blocks = kernel.blocks;
+  const auto processors = static_cast<uint64_t>(state().multiprocessors);
+  const auto room = static_cast<uint64_t>(std::max(
+      1, residentBlocks(function.program,
+                        static_cast<int>(threads[0] * threads[1] * threads[2]),
+                        kernel.sharedBytes)));
+  launch.resident = processors * room;
+  const uint64_t count = uint64_t(blocks[0]) * blocks[1] * blocks[2];
+  launch.together = std::min(room, (count + processors - 1) / processors);
   try {
     ptx::run(launch);
   } catch (const ptx::Fault &fault) {

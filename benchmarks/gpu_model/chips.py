@@ -17,6 +17,7 @@ class Chip:
     gigahertz: float
     issue: int  # warp instructions a cycle
     lanes: dict  # a cycle, by the kind of instruction
+    l1_kilobytes: int  # with shared memory
     l1_bytes_per_clock: int
     l2_bytes_per_clock: int | None  # of the chip; None if not published
     l2_megabytes: float
@@ -34,7 +35,7 @@ class Chip:
     def latencies(self):
         """As PIKO_TEST_DRIVER_LATENCIES takes them."""
         return (f"{self.arithmetic_cycles},{self.shared_cycles},{self.l1_cycles},"
-                f"{self.l2_cycles}")
+                f"{self.l2_cycles},{1024 * self.l1_kilobytes}")
 
     def milliseconds(self, cycles):
         return cycles / (self.gigahertz * 1e6)

@@ -6,12 +6,14 @@ Evaluation of General Arithmetic Expressions, JACM 21(2), 1974):
 
 * `least`: the greatest of what the chip's limits take for all of the work, and of
   the span: how long the last warp runs that has a multiprocessor for itself, whose
-  instructions wait for what they read. Caches hold what they can. No kernel can be
+  instructions wait for what they read. Caches hold what they can, until a fence of
+  the device's scope empties the first level, which is not coherent. No kernel can be
   faster that has as much room for blocks as was assumed.
 * `most`: the work and after it the span, as a device does that always runs
-  something when it can, with caches that hold nothing for long: loads find what they
-  read in the L2 cache. Kernels may be still slower: banks of shared memory and
-  atomics on one address are not in it.
+  something when it can. Of the first level of the cache a block has a part in the
+  span, as small as where all blocks that find room are beside it; the work finds
+  nothing there. Kernels may be still slower: banks of shared memory and atomics on one
+  address are not in it.
 
 What the host does is in neither.
 """

@@ -164,8 +164,8 @@ bool decodeChange(Decoding &d) {
 void fence(Warp &warp, const Instruction &it) {
   if (warp.buffer && it.variant)
     warp.changed |= warp.buffer->flush();
-  if (it.variant)
-    warp.block.cache.clear();
+  if (it.variant && warp.block.launch.latencies)
+    warp.block.emptyCaches();
 }
 
 bool decodeFence(Decoding &d) {

@@ -85,6 +85,16 @@ static uint64_t sharedBytesOf(const Launch &launch) {
   return uint64_t(launch.program.sharedBytes) + launch.dynamicSharedBytes;
 }
 
+/// What a block has of the first-level cache where as many are beside it as
+/// there may be: what shared memory leaves, in equal parts.
+static uint64_t cacheBytesOf(const Launch &launch) {
+  const uint64_t all = launch.latencies->cacheBytes,
+                 shared = launch.together * sharedBytesOf(launch);
+  if (all == 0)
+    return 8192;
+  return all > shared ? (all - shared) / launch.together : 0;
+}
+
 Block::Block(Launch &launch, Workspace &workspace)
     : launch(launch), threadCount(threadsOf(launch)),
       sharedSize(sharedBytesOf(launch)),
@@ -133,7 +143,9 @@ void Block::begin(uint64_t number) {
   for (auto &warp : warps)
     warp->reset();
   random.seed(launch.seed + number);
-  cache.clear();
+  if (launch.latencies)
+    cache.reset(cacheBytesOf(launch));
+  fences = 1;
   arrived = yielded = false;
 }
 

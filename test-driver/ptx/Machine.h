@@ -56,9 +56,14 @@ struct Launch {
   bool buffered = false;
   Conditions *conditions = nullptr; ///< Of the graph that launches it.
   uint64_t resident = 1; ///< How many blocks find room at the same time.
+  /// How many of them are on a multiprocessor, if all have as many.
+  uint64_t together = 1;
   const Latencies *latencies = nullptr; ///< Null: nobody asks for times.
   std::vector<Site> sites{};
   Footprint footprint{};
+  // Where there are latencies:
+  Touches touches{};
+  uint32_t fences = 1; ///< Of the device's scope so far, and one.
   /// The most that one warp ran.
   uint64_t longestWarp = 0;
   /// What went by until the last block ended.
@@ -126,9 +131,17 @@ public:
   uint64_t ran() const;
   /// When its last warp is where it is.
   Time time() const;
+  /// At a fence of the device's scope: what is read after it may be another
+  /// multiprocessor's.
+  void emptyCaches() {
+    cache.clear();
+    fences = ++launch.fences;
+  }
 
   Launch &launch;
-  SectorCache cache; ///< Where the launch has latencies.
+  // Where the launch has latencies:
+  SectorCache cache;   ///< The block's part.
+  uint32_t fences = 1; ///< Of the launch, at the block's latest.
   std::array<uint32_t, 3> index{};
   uint32_t threadCount;
   uint64_t sharedSize;

@@ -71,8 +71,8 @@ void Scoreboard::issue(const Program &program, uint32_t pc,
 }
 
 void Scoreboard::load(const Program &program, uint32_t pc, const Latencies &of,
-                      bool all, bool little) {
-  const Time latency{all ? of.hit : of.miss, little ? of.hit : of.miss};
+                      bool all, bool part) {
+  const Time latency{all ? of.hit : of.miss, part ? of.hit : of.miss};
   for (uint32_t i : program.writtenBy(program.dependences[pc]))
     ready[i] = issued.after(latency);
 }

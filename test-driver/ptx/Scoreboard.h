@@ -5,8 +5,9 @@
 // the registers that it reads are there. With no other warp beside it this is
 // how long it takes: its part of a launch's *span*, in the terms of work and
 // span. There are two times of everything: of a device whose first-level cache
-// has all that the launch has touched before, and of one where it has a little
-// for each block. What is not there is in the second level.
+// has all that the launch has touched before, and of one where each block has
+// its part alone. What is not there is in the second level. A fence empties
+// both, as it does where first-level caches are not coherent.
 //
 //===----------------------------------------------------------------------===//
 
@@ -15,8 +16,9 @@
 
 #include "ptx/text/Program.h"
 
-#include <array>
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace piko::ptx {
 
@@ -24,6 +26,9 @@ namespace piko::ptx {
 /// where they find it.
 struct Latencies {
   double arithmetic = 0, shared = 0, hit = 0, miss = 0;
+  /// Of the first-level cache of a multiprocessor, with the shared memory that
+  /// is in the same array; 0: a block has 8 KB.
+  uint64_t cacheBytes = 0;
 };
 
 /// Cycles, at least and at most.
@@ -39,11 +44,13 @@ struct Time {
   }
 };
 
-/// A first-level cache, as large as a block may hope for where many are on a
-/// multiprocessor: 8 KB, direct-mapped.
+/// What a block has of a first-level cache: direct-mapped.
 class SectorCache {
 public:
-  void clear() { sectors.fill(none); }
+  void reset(uint64_t bytes) {
+    sectors.assign(std::max<uint64_t>(bytes / 32, 1), none);
+  }
+  void clear() { std::fill(sectors.begin(), sectors.end(), none); }
   /// Whether a sector is there, which it is then.
   bool access(uint64_t sector) {
     return std::exchange(sectors[sector % sectors.size()], sector) == sector;
@@ -51,7 +58,7 @@ public:
 
 private:
   static constexpr uint64_t none = ~uint64_t(0);
-  std::array<uint64_t, 256> sectors;
+  std::vector<uint64_t> sectors;
 };
 
 class Scoreboard {
@@ -60,9 +67,9 @@ public:
   void reset(const Program &program);
   void issue(const Program &program, uint32_t pc, const Latencies &latencies);
   /// Where the load that was issued last found what it reads: in the cache that
-  /// has all, in that which has little.
+  /// has all, in the block's part.
   void load(const Program &program, uint32_t pc, const Latencies &latencies,
-            bool all, bool little);
+            bool all, bool part);
   /// Takes the last instruction back, which has not been run.
   void takeBack() { now = before; }
   /// A loop that waits for memory to change sleeps: however often it does, it

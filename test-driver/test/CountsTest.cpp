@@ -194,13 +194,59 @@ TEST_F(SpanTest, LoadsTakeAsLongAsTheirMemory) {
                     "add.s64 %rd7, %rd6, %rd7;"),
             Spans(206, 206));
   EXPECT_EQ(spansOf("ld.global.b64 %rd6, [%rd3];"), Spans(5, 5));
-  // One after the other. A fence empties the block's cache.
+  // One after the other. A fence empties the cache.
   const std::string twice =
                         "ld.global.b64 %rd6, [%rd3]; add.s64 %rd7, %rd6, 0;",
                     again =
                         "ld.global.b64 %rd6, [%rd3]; add.s64 %rd7, %rd6, 1;";
   EXPECT_EQ(spansOf(twice + again), Spans(238, 238));
-  EXPECT_EQ(spansOf(twice + "membar.gl;" + again), Spans(239, 409));
+  EXPECT_EQ(spansOf(twice + "membar.gl;" + again), Spans(409, 409));
+}
+
+// What the block has read is not there behind a fence of the device's scope.
+TEST_F(SpanTest, FencesEmptyTheCache) {
+  const std::string twice = "ld.global.b64 %rd6, [%rd1];"
+                            "add.s64 %rd7, %rd1, %rd6;"
+                            "%s ld.global.b64 %rd6, [%rd7];"
+                            "add.s64 %rd7, %rd6, 1;";
+  auto withFence = [&](const std::string &fence) {
+    std::string text = twice;
+    return spansOf(text.replace(text.find("%s"), 2, fence), 32, 2);
+  };
+  const Spans none = withFence(""), all = withFence("membar.gl;"),
+              own = withFence("membar.cta;");
+  // It is issued while what is read is on its way.
+  EXPECT_EQ(all.first - none.first, 170);
+  EXPECT_EQ(all.second - none.second, 170);
+  EXPECT_EQ(own, none);
+}
+
+// What is read again has one place in two sectors with what came between, and
+// another one in four.
+TEST_F(SpanTest, BlocksHaveEqualPartsOfTheCache) {
+  const std::string text = "ld.global.b64 %rd6, [%rd1];"
+                           "add.s64 %rd7, %rd1, %rd6;"
+                           "ld.global.b64 %rd6, [%rd7+64];"
+                           "add.s64 %rd7, %rd1, %rd6;"
+                           "ld.global.b64 %rd6, [%rd7];"
+                           "add.s64 %rd7, %rd6, 1;";
+  auto missesOf = [&](const char *latencies, const std::string &body,
+                      uint32_t blocks) {
+    EXPECT_EQ(pikoTestDriverLatencies(latencies), 0);
+    const Spans spans = spansOf(body, 32, blocks);
+    return (spans.second - spans.first) / 170.0;
+  };
+  EXPECT_EQ(missesOf("4,20,30,200", text, 1), 0);
+  EXPECT_EQ(missesOf("4,20,30,200,64", text, 1), 1);
+  EXPECT_EQ(missesOf("4,20,30,200,128", text, 1), 0);
+  // Of five blocks two are on one of four multiprocessors.
+  EXPECT_EQ(missesOf("4,20,30,200,128", text, 4), 0);
+  EXPECT_EQ(missesOf("4,20,30,200,128", text, 5), 1);
+  EXPECT_EQ(missesOf("4,20,30,200,256", text, 5), 0);
+  // Shared memory is in the same array.
+  const std::string shared = ".shared .b64 room[8];" + text;
+  EXPECT_EQ(missesOf("4,20,30,200,128", shared, 1), 1);
+  EXPECT_EQ(missesOf("4,20,30,200,192", shared, 1), 0);
 }
 
 // The first of two warps comes 100 iterations later.
@@ -224,10 +270,12 @@ TEST_F(SpanTest, BarriersWaitForTheLast) {
 
 TEST_F(SpanTest, LatenciesThatAreNone) {
   for (const char *text :
-       {"4,20,30", "4,20,30,200,1", "4,20,30,x", "4,20,,200", "4,20,30,-1",
-        " 4,20,30,200", "0,1,1,1", "inf,1,1,1", ","})
+       {"4,20,30", "4,20,30,200,0", "4,20,30,200,1,1", "4,20,30,200,",
+        "4,20,30,200,x", "4,20,30,200,-1", "4,20,30,x", "4,20,,200",
+        "4,20,30,-1", " 4,20,30,200", "0,1,1,1", "inf,1,1,1", ","})
     EXPECT_EQ(pikoTestDriverLatencies(text), 1) << text;
   EXPECT_EQ(pikoTestDriverLatencies("4.5,20,30,200"), 0);
+  EXPECT_EQ(pikoTestDriverLatencies("4.5,20,30,200,1024"), 0);
 }
 
 TEST_F(CountsTest, AsJSON) {

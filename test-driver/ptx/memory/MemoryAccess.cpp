@@ -48,17 +48,19 @@ void piko::ptx::countAccess(Warp &warp, uint64_t bytes,
   warp.site->sectors += sectors.size();
   warp.site->bytes += bytes * static_cast<uint32_t>(std::popcount(warp.active));
   Launch &launch = warp.block.launch;
-  bool isInAll = true, isInLittle = true;
+  bool isInAll = true, isInPart = true;
   for (uint64_t sector : sectors) {
-    isInAll &= !launch.footprint.add(sector);
-    if (launch.latencies)
-      isInLittle &= warp.block.cache.access(sector);
+    launch.footprint.add(sector);
+    if (!launch.latencies)
+      continue;
+    isInAll &= launch.touches.touch(sector, warp.block.fences, launch.fences);
+    isInPart &= warp.block.cache.access(sector);
   }
   const Instruction &it = warp.program->code[warp.pc];
   if (launch.latencies && it.counted != Class::Atomic &&
       it.order == Order::Weak)
     warp.scoreboard.load(*warp.program, warp.pc, *launch.latencies, isInAll,
-                         isInLittle);
+                         isInPart);
 }
 
 namespace {
