@@ -425,7 +425,8 @@ def ReduceByAtomics : Pass<"piko-reduce-by-atomics", "::mlir::ModuleOp"> {
     primitive become words of 64 bits. Kernels that precede the kernel find the least
     words of each pixel by atomics (visibility buffer). In the kernel itself a
     primitive stores to the pixels whose words are its own. Work after a local edge
-    does both in one kernel (`piko.again`). Images whose numbers change by one
+    does both in one kernel (`piko.again`). In strips, the words are cleared for each,
+    or once, if the key is one word and its comparison strict. Images whose numbers change by one
     commuting integer operation change by `piko.atomic`.
 
     **Guarantees** the same bits and the same errors.
@@ -466,8 +467,8 @@ def ReduceByAtomics : Pass<"piko-reduce-by-atomics", "::mlir::ModuleOp"> {
       ...
     ```
 
-    **Limits**: lists, kernels that are launched again and again, work that reads what
-    the kernel writes, `serialize`, and keys of more than two words keep one block.
+    **Limits**: lists, kernels on a cycle, work that reads what the kernel writes,
+    `serialize`, and keys of more than two words keep one block.
     Remarks say what is selected, and why not.
   }];
   let dependentDialects = ["::mlir::arith::ArithDialect",

@@ -126,15 +126,24 @@ void WorkSplitter::createPass(int64_t pass) {
     of->reduce(site, std::min(pass, of->size() - 1));
 }
 
-/// Before the kernel's launch.
+/// A launch, or the strips that it is in.
+static Operation *findAround(LaunchOp launch) {
+  auto strips = dyn_cast<StripsOp>(launch->getParentOp());
+  return strips ? strips.getOperation() : launch.getOperation();
+}
+
+/// Before the kernel's launch, as positions are those in a strip; but once
+/// where what strips before have left comes after all that is still selected.
 void WorkSplitter::clearWords() {
-  SmallVector<Attribute> images;
-  for (const SelectionWords &of : words)
+  LaunchOp launch = findLaunch(kernel);
+  for (const SelectionWords &of : words) {
+    SmallVector<Attribute> images;
     for (ImageOp image : of.getImages())
       images.push_back(FlatSymbolRefAttr::get(image.getSymNameAttr()));
-  LaunchOp launch = findLaunch(kernel);
-  OpBuilder builder(launch);
-  ClearOp::create(builder, launch.getLoc(), builder.getArrayAttr(images));
+    OpBuilder builder(of.mayStay() ? findAround(launch)
+                                   : launch.getOperation());
+    ClearOp::create(builder, launch.getLoc(), builder.getArrayAttr(images));
+  }
 }
 
 void WorkSplitter::split() {
@@ -212,10 +221,12 @@ static std::optional<Reason> whyNotTwice(KernelOp kernel, ItemsOp items) {
     reason = Reason{op->getLoc(), why};
     return WalkResult::interrupt();
   });
+  // Strips follow each other in order of lineage; waves do not.
   LaunchOp launch = findLaunch(kernel);
-  if (!reason && !(launch && isa<ProgramOp>(launch->getParentOp())))
-    reason = Reason{kernel.getLoc(),
-                    "it is launched again and again, in strips or on a cycle"};
+  if (!reason && !(launch && isa<ProgramOp>(findAround(launch)->getParentOp())))
+    reason =
+        Reason{kernel.getLoc(), "it is on a cycle, where primitives of one "
+                                "wave may come before those of another"};
   return reason;
 }
 

@@ -15,6 +15,10 @@ namespace piko {
 class SelectionWords {
 public:
   explicit SelectionWords(const Selection &selection);
+  /// Whether words of one launch may stay for the next one, of primitives that
+  /// follow: what is selected then is before what the pixel keeps by its key
+  /// alone, so that its word is less. A second word may be greater.
+  bool mayStay() const { return size() == 1 && !key.last; }
   /// How many there are: a pass for each.
   int64_t size() const { return int64_t(parts.size()); }
   /// Declares an image for each, as large as that of the key.

@@ -248,7 +248,7 @@ piko.pipeline @Again rank 1 {
   piko.source @a
   piko.edge @a[0] -> @a
   // expected-remark @below {{stage 'a' runs its only bin in one block}}
-  // expected-note @below {{it is launched again and again, in strips or on a cycle}}
+  // expected-note @below {{it is on a cycle, where primitives of one wave may come before those of another}}
   piko.stage @a bins [0] threads 1 : @F -> [@F] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
