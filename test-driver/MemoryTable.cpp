@@ -3,14 +3,15 @@
 
 #include "State.h"
 
+#include <algorithm>
 #include <cstring>
 #include <sys/mman.h>
+#include <unistd.h>
 
 using namespace piko::testdriver;
 
 static constexpr uint64_t page = 4096;
-/// More than this is left as the system gives it: only what is touched takes
-/// memory.
+/// More than this is filled where it is touched, which alone takes memory.
 static constexpr uint64_t filledBytes = uint64_t(4) << 20;
 static constexpr size_t remembered = 64;
 
@@ -20,6 +21,46 @@ static uint8_t *map(uint64_t bytes, int protection) {
   return memory == MAP_FAILED ? nullptr : static_cast<uint8_t *>(memory);
 }
 
+/// A file of so many bytes that nobody has written; -1: there is none.
+static int openUnwritten() {
+  int file = memfd_create("unwritten", MFD_CLOEXEC);
+  if (file < 0 || ftruncate(file, filledBytes) != 0)
+    return -1;
+  void *bytes =
+      mmap(nullptr, filledBytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  if (bytes == MAP_FAILED)
+    return -1;
+  std::memset(bytes, piko::ptx::unwritten, filledBytes);
+  munmap(bytes, filledBytes);
+  return file;
+}
+
+/// Puts copies of that file, made page by page as they are written, in the
+/// place of memory that is mapped. False if the system refuses.
+static bool fillLater(uint8_t *memory, uint64_t bytes) {
+  static const int file = openUnwritten();
+  for (uint64_t done = 0; file >= 0 && done < bytes; done += filledBytes)
+    if (mmap(memory + done, std::min(filledBytes, bytes - done),
+             PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_FIXED | MAP_NORESERVE,
+             file, 0) == MAP_FAILED)
+      return false;
+  return file >= 0;
+}
+
+/// Whole pages; null if the system refuses.
+static uint8_t *mapUnwritten(uint64_t bytes) {
+  uint8_t *memory = map(bytes, PROT_READ | PROT_WRITE);
+  if (!memory)
+    return nullptr;
+  if (bytes <= filledBytes) {
+    std::memset(memory, piko::ptx::unwritten, bytes);
+  } else if (!fillLater(memory, bytes)) {
+    munmap(memory, bytes);
+    return nullptr;
+  }
+  return memory;
+}
+
 const Allocation *MemoryTable::allocate(AllocationKind kind, uint64_t bytes) {
   Allocation made;
   made.kind = kind;
@@ -27,7 +68,7 @@ const Allocation *MemoryTable::allocate(AllocationKind kind, uint64_t bytes) {
   if (bytes > UINT64_MAX - 2 * page)
     return nullptr;
   made.mapped = (bytes + page - 1) / page * page;
-  made.memory = map(made.mapped, PROT_READ | PROT_WRITE);
+  made.memory = mapUnwritten(made.mapped);
   if (!made.memory)
     return nullptr;
   made.begin = reinterpret_cast<uint64_t>(made.memory);
@@ -41,8 +82,6 @@ const Allocation *MemoryTable::allocate(AllocationKind kind, uint64_t bytes) {
     made.begin = reinterpret_cast<uint64_t>(reserved);
     used += bytes;
   }
-  if (bytes <= filledBytes)
-    std::memset(made.memory, ptx::unwritten, made.mapped);
   return &(allocations[made.begin] = made);
 }
 

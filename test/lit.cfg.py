@@ -96,7 +96,8 @@ if not all_tests and not config.sanitize and os.path.exists(fork_server):
     path.insert(0, start_fork_server(tools + [config.cxx]))
     config.cxx = os.path.join(path[0], os.path.basename(config.cxx))
 config.environment["PATH"] = os.path.pathsep.join(path)
-for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME"):
+for name in ("OMP_NUM_THREADS", "ASAN_OPTIONS", "TSAN_OPTIONS", "HOME",
+             "PIKO_TEST_DRIVER_MODES"):
     if name in os.environ:
         config.environment[name] = os.environ[name]
 

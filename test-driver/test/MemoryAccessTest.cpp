@@ -175,6 +175,21 @@ TEST_F(MemoryAccessTest, UnwrittenMemoryIsNotZero) {
   EXPECT_EQ(out[0], 0xcdcdcdcdcdcdcdcd);
 }
 
+TEST_F(MemoryAccessTest, NorIsAnyOfALargeAllocation) {
+  constexpr size_t bytes = (size_t(9) << 20) + 24, written = size_t(5) << 20;
+  CUdeviceptr memory = 0;
+  ASSERT_EQ(cuMemAlloc(&memory, bytes), CUDA_SUCCESS);
+  ASSERT_EQ(cuMemsetD8Async(memory + written, 1, 8, nullptr), CUDA_SUCCESS);
+  for (size_t at : {size_t(0), size_t(4) << 20, written, written + 8,
+                    size_t(8) << 20, bytes - 8}) {
+    uint64_t word = 0;
+    ASSERT_EQ(cuMemcpyDtoHAsync(&word, memory + at, 8, nullptr), CUDA_SUCCESS);
+    EXPECT_EQ(word, at == written ? 0x0101010101010101 : 0xcdcdcdcdcdcdcdcd)
+        << at;
+  }
+  EXPECT_EQ(cuMemFree(memory), CUDA_SUCCESS);
+}
+
 TEST_F(MemoryAccessTest, UnwrittenRegistersHoldNothingOfOtherBlocks) {
   for (uint32_t last : {31, 15}) {
     auto out = run(R"(
