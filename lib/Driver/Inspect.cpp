@@ -159,7 +159,11 @@ std::optional<std::string> piko::writeText(const TextOptions &options,
   bool isGPU = options.kind == TextKind::GPU || options.kind == TextKind::PTX;
   CPUOptions cpu;
   if (!isGPU) {
-    llvm::Expected<Processor> processor = resolveProcessor(options.target.cpu);
+    llvm::Expected<llvm::Triple> triple = resolveTriple(options.target.arch);
+    if (!triple)
+      return inspection.fail(triple.takeError());
+    llvm::Expected<Processor> processor =
+        resolveProcessor(options.target.cpu, *triple);
     if (!processor)
       return inspection.fail(processor.takeError());
     cpu.lanes = processor->lanes;

@@ -18,7 +18,6 @@
 
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/Support/Path.h"
-#include "llvm/TargetParser/Host.h"
 
 #include "Piko/Analysis/LinearFacts.h"
 #include "pikort/pikort.h"
@@ -139,8 +138,9 @@ static void addDeviceVersion(ModuleOp module, const ObjectOptions &options,
 /// LLVM IR of the compiled pipeline; null after diagnostics.
 static std::unique_ptr<llvm::Module>
 compilePipeline(const ObjectOptions &options, std::vector<Processor> processors,
-                const Files &files, MLIRContext &context,
-                llvm::LLVMContext &llvmContext, CompiledObject &object) {
+                const llvm::Triple &triple, const Files &files,
+                MLIRContext &context, llvm::LLVMContext &llvmContext,
+                CompiledObject &object) {
   OwningOpRef<ModuleOp> module = readPipeline(options.source, context, files);
   if (!module)
     return nullptr;
@@ -162,13 +162,15 @@ compilePipeline(const ObjectOptions &options, std::vector<Processor> processors,
     return nullptr;
   if (copy)
     addDeviceVersion(*copy, options, processors, translated, llvmContext);
-  return defineProgram(std::move(translated), name, object.symbol, processors);
+  return defineProgram(std::move(translated), name, object.symbol, processors,
+                       triple);
 }
 
 /// Fills an entry but for its files; false after diagnostics, which are there
 /// too.
 static bool compile(const ObjectOptions &options,
-                    llvm::ArrayRef<Processor> processors, const Files &files,
+                    llvm::ArrayRef<Processor> processors,
+                    const llvm::Triple &triple, const Files &files,
                     Entry &entry) {
   PikoContext context;
   llvm::raw_string_ostream stream(entry.diagnostics);
@@ -177,7 +179,7 @@ static bool compile(const ObjectOptions &options,
     printer.addText(options.source.file, *options.source.text);
   llvm::LLVMContext llvmContext;
   std::unique_ptr<llvm::Module> module = compilePipeline(
-      options, processors, files, context, llvmContext, entry.object);
+      options, processors, triple, files, context, llvmContext, entry.object);
   if (!module)
     return false;
   piko::TargetOptions target =
@@ -232,12 +234,17 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
   ObjectOptions options = given;
   options.source.synthesis =
       options.target.leaveOutUnseen(options.source.synthesis);
-  llvm::Expected<std::vector<Processor>> processors = resolveProcessors(
-      options.target.cpu, llvm::Triple(llvm::sys::getProcessTriple()));
-  if (!processors) {
-    diagnostics += "error: " + llvm::toString(processors.takeError()) + "\n";
+  auto fail = [&](llvm::Error error) {
+    diagnostics += "error: " + llvm::toString(std::move(error)) + "\n";
     return std::nullopt;
-  }
+  };
+  llvm::Expected<llvm::Triple> triple = resolveTriple(options.target.arch);
+  if (!triple)
+    return fail(triple.takeError());
+  llvm::Expected<std::vector<Processor>> processors =
+      resolveProcessors(options.target.cpu, *triple);
+  if (!processors)
+    return fail(processors.takeError());
   Files files = openFiles(options.source);
   SourceCache cache(options.source.cache);
   std::string request;
@@ -253,7 +260,7 @@ std::optional<CompiledObject> piko::compileObject(const ObjectOptions &given,
   }
   auto recorder = llvm::makeIntrusiveRefCnt<SourceRecorder>(files);
   Entry entry;
-  bool ok = compile(options, *processors, recorder, entry);
+  bool ok = compile(options, *processors, *triple, recorder, entry);
   diagnostics += entry.diagnostics;
   if (!ok)
     return std::nullopt;

@@ -40,7 +40,10 @@ std::string piko::makeObjectRequest(const ObjectOptions &options,
         int(source.synthesis.count), int(100 * source.synthesis.mappingWindow),
         int(source.gpu.seed), int(source.gpu.blocks), int(source.gpu.threads)})
     key.add(std::to_string(number));
-  key.add(source.gpu.chip).add(options.nameSpace).add(getRuntimeIncludeDir());
+  key.add(options.target.arch)
+      .add(source.gpu.chip)
+      .add(options.nameSpace)
+      .add(getRuntimeIncludeDir());
   for (const std::string &chip : source.gpu.cubins)
     key.add(chip);
   if (!source.gpu.cubins.empty())

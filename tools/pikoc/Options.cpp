@@ -158,6 +158,9 @@ void addSourceOptions(CommandLine &line, Options &options) {
 }
 
 void addTargetOptions(CommandLine &line, Options &options) {
+  line.addText("--arch", "NAME", options.arch,
+               "the processor's architecture, x86_64 or aarch64 (this "
+               "machine's)");
   line.addText(
       "--cpu", "NAME,...", options.cpu,
       "the processor to make code for, as clang names them, or native "
@@ -239,6 +242,9 @@ std::string findGPUProblem(const Options &options) {
   bool isGPU = options.getEmit() >= Emit::GPU;
   GPUTarget target = options.gpu.target;
   bool isForGPU = target != GPUTarget::None;
+  if (isGPU && !options.arch.empty())
+    return "--arch is for the processor's code, and goes without --emit=gpu "
+           "and --emit=ptx";
   if (isForGPU && isGPU)
     return "--target is for the host's code, and goes without --emit=gpu and "
            "--emit=ptx";
@@ -335,7 +341,8 @@ CompileOptions Options::getSource(const std::string &pipe, bool isTuned) const {
 }
 
 TargetOptions Options::getTarget(const std::string &pipe) const {
-  return TargetOptions{.cpu = cpu, .optLevel = optLevel, .sanitizer = sanitizer}
+  return TargetOptions{
+      .cpu = cpu, .optLevel = optLevel, .sanitizer = sanitizer, .arch = arch}
       .leaveOut(getSource(pipe).synthesis);
 }
 

@@ -38,7 +38,7 @@ struct Options {
   std::optional<Emit> emit;
   std::string output = "-";
   std::string header, depfile; ///< empty: none
-  std::string nameSpace, cpu, cacheDirectory;
+  std::string nameSpace, arch, cpu, cacheDirectory;
   GPUOptions gpu;
   bool setsGPUThreads = false, setsGPUChip = false;
   bool setsGPUSeed = false, setsGPUBlocks = false;

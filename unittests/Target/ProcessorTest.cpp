@@ -20,7 +20,41 @@ TEST(Processor, ListsAreForX86) {
             "between several, but got 'cortex-a72,neoverse-n1'");
 }
 
+TEST(Processor, OfAnotherArchitecture) {
+  auto triple = resolveTriple("aarch64");
+  ASSERT_TRUE(bool(triple));
+  EXPECT_TRUE(triple->isAArch64());
+  EXPECT_TRUE(triple->isOSLinux());
+  auto generic = resolveProcessor("", *triple);
+  ASSERT_TRUE(bool(generic));
+  EXPECT_EQ(generic->name, "generic");
+  EXPECT_EQ(generic->lanes, 4);
+  EXPECT_TRUE(generic->needs.empty());
+  auto wrong = resolveProcessor("x86-64-v3", *triple);
+  ASSERT_FALSE(bool(wrong));
+  EXPECT_EQ(
+      llvm::toString(wrong.takeError()),
+      "there is no processor 'x86-64-v3' for aarch64; expected a name that "
+      "'clang --target=aarch64-linux --print-supported-cpus' lists");
+}
+
+TEST(Processor, ArchitecturesAreNamed) {
+  auto triple = resolveTriple("arm64");
+  ASSERT_FALSE(bool(triple));
+  EXPECT_EQ(llvm::toString(triple.takeError()),
+            "expected the architecture x86_64 or aarch64, but got 'arm64'");
+}
+
 #if defined(__x86_64__)
+TEST(Processor, NativeIsOfThisMachine) {
+  llvm::Triple triple("aarch64-unknown-linux-gnu");
+  auto native = resolveProcessor("native", triple);
+  ASSERT_FALSE(bool(native));
+  EXPECT_EQ(llvm::toString(native.takeError()),
+            "expected the name of a processor, because 'native' is this "
+            "machine's, which does not run code for aarch64");
+}
+
 TEST(Processor, NeedsWhatCodeMayUse) {
   auto base = resolveProcessor("x86-64");
   ASSERT_TRUE(bool(base));

@@ -80,6 +80,9 @@ struct TargetOptions {
   Sanitizer sanitizer = Sanitizer::None;
   /// LLVM's own vectors, of inner loops and of what stands in a row.
   bool loopVectorize = true, slpVectorize = true;
+  /// x86_64 or aarch64; empty = this machine's. The text is read as on this
+  /// machine, whatever its code is for.
+  std::string arch = {};
 
   /// The same without LLVM's passes that synthesis does without.
   TargetOptions leaveOut(const SynthesisOptions &synthesis) const {

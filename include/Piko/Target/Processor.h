@@ -33,15 +33,22 @@ struct Processor {
   const std::string &getLabel() const { return device.empty() ? name : device; }
 };
 
-/// LLVM's target for this machine, ready to make code.
-llvm::Expected<const llvm::Target *> lookUpHost(const llvm::Triple &triple);
+/// The machines that TargetOptions::arch stands for, with Linux, or an error if
+/// it is none that code is made for.
+llvm::Expected<llvm::Triple> resolveTriple(llvm::StringRef arch);
+
+/// LLVM's target of a triple that resolveTriple gave, ready to make code.
+llvm::Expected<const llvm::Target *>
+initializeTarget(const llvm::Triple &triple);
 
 /// What every machine of the architecture runs.
 llvm::StringRef getBaseProcessor(const llvm::Triple &triple);
 
 /// The processor that TargetOptions::cpu stands for, or an error if there is no
-/// such processor.
+/// such processor, of this machine's architecture or of that which is said.
 llvm::Expected<Processor> resolveProcessor(llvm::StringRef cpu);
+llvm::Expected<Processor> resolveProcessor(llvm::StringRef cpu,
+                                           const llvm::Triple &triple);
 
 /// The same for names between commas. Each must be chosen on some machine,
 /// where the last one is taken that fits.

@@ -21,7 +21,6 @@
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/Target/TargetMachine.h"
-#include "llvm/TargetParser/Host.h"
 #include "llvm/Transforms/Instrumentation/AddressSanitizer.h"
 #include "llvm/Transforms/Instrumentation/ThreadSanitizer.h"
 
@@ -32,11 +31,13 @@ using namespace piko;
 
 static Expected<std::unique_ptr<TargetMachine>>
 createMachine(const piko::TargetOptions &options) {
-  Triple triple(sys::getProcessTriple());
-  Expected<const Target *> target = lookUpHost(triple);
+  Expected<Triple> triple = resolveTriple(options.arch);
+  if (!triple)
+    return triple.takeError();
+  Expected<const Target *> target = initializeTarget(*triple);
   if (!target)
     return target.takeError();
-  Expected<Processor> processor = resolveProcessor(options.cpu);
+  Expected<Processor> processor = resolveProcessor(options.cpu, *triple);
   if (!processor)
     return processor.takeError();
   llvm::TargetOptions flags;
@@ -49,7 +50,7 @@ createMachine(const piko::TargetOptions &options) {
                : options.optLevel == 1 ? CodeGenOptLevel::Less
                                        : CodeGenOptLevel::Default;
   return std::unique_ptr<TargetMachine>((*target)->createTargetMachine(
-      triple, processor->name, processor->features, flags, Reloc::PIC_,
+      *triple, processor->name, processor->features, flags, Reloc::PIC_,
       CodeModel::Small, level));
 }
 

@@ -9,6 +9,7 @@
 #include "llvm/ADT/STLExtras.h"
 #include "llvm/ADT/StringExtras.h"
 #include "llvm/ADT/StringSet.h"
+#include "llvm/Config/Targets.h"
 #include "llvm/MC/MCSubtargetInfo.h"
 #include "llvm/Support/TargetSelect.h"
 #include "llvm/TargetParser/Host.h"
@@ -32,9 +33,39 @@ StringRef piko::getBaseProcessor(const Triple &triple) {
   return triple.getArch() == Triple::x86_64 ? "x86-64" : "generic";
 }
 
-Expected<const Target *> piko::lookUpHost(const Triple &triple) {
+Expected<Triple> piko::resolveTriple(StringRef arch) {
+  Triple host(sys::getProcessTriple());
+  if (arch.empty() || arch == host.getArchName())
+    return host;
+  for (StringRef other : {"x86_64", "aarch64"})
+    if (arch == other) {
+      host.setArchName(other);
+      return host;
+    }
+  return createStringError("expected the architecture x86_64 or aarch64, but "
+                           "got '" +
+                           arch + "'");
+}
+
+Expected<const Target *> piko::initializeTarget(const Triple &triple) {
   InitializeNativeTarget();
   InitializeNativeTargetAsmPrinter();
+#if LLVM_HAS_AARCH64_TARGET
+  if (triple.isAArch64()) {
+    LLVMInitializeAArch64TargetInfo();
+    LLVMInitializeAArch64Target();
+    LLVMInitializeAArch64TargetMC();
+    LLVMInitializeAArch64AsmPrinter();
+  }
+#endif
+#if LLVM_HAS_X86_TARGET
+  if (triple.isX86()) {
+    LLVMInitializeX86TargetInfo();
+    LLVMInitializeX86Target();
+    LLVMInitializeX86TargetMC();
+    LLVMInitializeX86AsmPrinter();
+  }
+#endif
   return lookUpTarget(triple);
 }
 
@@ -74,22 +105,46 @@ static void findFeatures(const Target &target, const Triple &triple,
 }
 
 Expected<Processor> piko::resolveProcessor(StringRef cpu) {
-  Triple triple(sys::getProcessTriple());
-  Expected<const Target *> target = lookUpHost(triple);
+  return resolveProcessor(cpu, Triple(sys::getProcessTriple()));
+}
+
+/// An error for a name that no processor of the architecture has.
+static Error refuseProcessor(StringRef cpu, const Triple &triple,
+                             bool isForeign) {
+  std::string list = "'clang --print-supported-cpus' lists";
+  if (!isForeign)
+    return createStringError("there is no processor '" + cpu + "' for " +
+                             triple.getArchName() +
+                             "; expected 'native' or a name that " + list);
+  list = ("'clang --target=" + triple.getArchName() +
+          "-linux --print-supported-cpus' lists")
+             .str();
+  if (cpu == "native")
+    return createStringError(
+        "expected the name of a processor, because 'native' is this machine's, "
+        "which does not run code for " +
+        triple.getArchName());
+  return createStringError("there is no processor '" + cpu + "' for " +
+                           triple.getArchName() + "; expected a name that " +
+                           list);
+}
+
+Expected<Processor> piko::resolveProcessor(StringRef cpu,
+                                           const Triple &triple) {
+  Expected<const Target *> target = initializeTarget(triple);
   if (!target)
     return target.takeError();
+  bool isForeign =
+      triple.getArch() != Triple(sys::getProcessTriple()).getArch();
   Processor processor;
-  if (cpu == "native")
+  if (cpu == "native" && !isForeign)
     processor = getNativeProcessor();
   else if (cpu.empty())
     processor.name = getDefaultProcessor(triple);
   else if (hasProcessor(**target, triple, cpu))
     processor.name = cpu;
   else
-    return createStringError("there is no processor '" + cpu + "' for " +
-                             triple.getArchName() +
-                             "; expected 'native' or a name that 'clang "
-                             "--print-supported-cpus' lists");
+    return refuseProcessor(cpu, triple, isForeign);
   findFeatures(**target, triple, processor);
   return processor;
 }
@@ -128,7 +183,7 @@ Expected<std::vector<Processor>> piko::resolveProcessors(StringRef cpus,
       return createStringError(
           "expected names of processors between commas, but got '" + cpus +
           "'");
-    Expected<Processor> processor = resolveProcessor(name);
+    Expected<Processor> processor = resolveProcessor(name, triple);
     if (!processor)
       return processor.takeError();
     processors.push_back(std::move(*processor));

@@ -16,7 +16,6 @@
 #include "llvm/IR/Constants.h"
 #include "llvm/IR/IRBuilder.h"
 #include "llvm/Linker/Linker.h"
-#include "llvm/TargetParser/Host.h"
 
 #include "pikort/pikort.h"
 
@@ -109,10 +108,10 @@ static Function *makeSetup(Module &module, StringRef pipeline,
 std::unique_ptr<Module>
 piko::defineProgram(std::vector<std::unique_ptr<Module>> modules,
                     StringRef pipeline, StringRef symbol,
-                    ArrayRef<Processor> processors) {
+                    ArrayRef<Processor> processors, const Triple &triple) {
   SmallVector<Version> versions;
   for (auto [processor, part] : llvm::zip_equal(processors, modules)) {
-    part->setTargetTriple(Triple(sys::getProcessTriple()));
+    part->setTargetTriple(triple);
     versions.push_back(
         makeVersion(*part, pipeline, processor, modules.size() == 1));
   }

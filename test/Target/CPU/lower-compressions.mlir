@@ -5,6 +5,7 @@
 // RUN: pikoc %s --emit=assembly --pipe P8 --cpu x86-64-v3 | FileCheck %s --check-prefix=AVX2
 // RUN: pikoc %s --emit=assembly --pipe P4 --cpu x86-64-v2 | FileCheck %s --check-prefix=SSSE3
 // RUN: pikoc %s --emit=assembly --pipe P4 --cpu x86-64 | FileCheck %s --check-prefix=SSE2
+// RUN: pikoc %s --emit=assembly --pipe P4 --arch aarch64 | FileCheck %s --check-prefix=NEON
 
 // AVX512:         vpcompressd %zmm
 // AVX512-NOT:     vpcompressd {{.*}}(%r
@@ -14,6 +15,8 @@
 // AVX2:           vperm{{d|ps}} %ymm
 // SSSE3:          pshufb
 // SSE2-NOT:       pshufb
+// NEON:           .Lpiko.compressions.v4
+// NEON:           tbl v{{[0-9]+}}.16b, { v{{[0-9]+}}.16b }, v
 
 piko.record @V {"a" : f32 at 0, "b" : f64 at 8} size 16 align 8
 

@@ -7,6 +7,7 @@
 // RUN: pikoc %s --emit=assembly --pipe P4 --cpu x86-64-v2 | FileCheck %s --check-prefix=SSSE3
 // RUN: pikoc %s --emit=assembly --pipe P4 --cpu x86-64 | FileCheck %s --check-prefix=SSE2
 // RUN: pikoc %s --emit=assembly --pipe P16 --cpu x86-64-v3 | FileCheck %s --check-prefix=WIDE
+// RUN: pikoc %s --emit=assembly --pipe P4 --arch aarch64 | FileCheck %s --check-prefix=NEON
 
 // Of 64 bits an instruction takes two registers, or they move as halves.
 // AVX512:         vpermd %zmm
@@ -18,6 +19,7 @@
 // AVX2:          vperm{{d|ps}} %ymm
 // AVX-COUNT-3:   vpermilps %xmm{{.*}}, %xmm{{.*}}, %xmm
 // SSSE3-COUNT-4: pshufb
+// NEON-COUNT-3:  tbl v{{[0-9]+}}.16b, { v{{[0-9]+}}.16b }, v
 // SSE2-COUNT-8:  (%rsp,%r{{[a-z0-9]+}},{{[48]}}), %xmm
 // WIDE-COUNT-8:  (%rsp,%r{{[a-z0-9]+}},{{[48]}})
 

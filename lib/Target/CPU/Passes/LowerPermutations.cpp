@@ -7,6 +7,7 @@
 #include "llvm/ADT/Sequence.h"
 #include "llvm/CodeGen/TargetSubtargetInfo.h"
 #include "llvm/IR/IRBuilder.h"
+#include "llvm/IR/IntrinsicsAArch64.h"
 #include "llvm/IR/IntrinsicsX86.h"
 
 using namespace llvm;
@@ -14,18 +15,27 @@ using namespace piko;
 
 namespace {
 
-/// What x86 has for so many lanes of 32 bits.
+/// What a machine has for so many lanes of 32 bits.
 struct WordPermutation {
   unsigned lanes;
   StringLiteral feature;
   Intrinsic::ID id;
 };
 
-constexpr WordPermutation wordPermutations[] = {
+constexpr WordPermutation x86Permutations[] = {
     {16, "+avx512f", Intrinsic::x86_avx512_permvar_si_512},
     {8, "+avx2", Intrinsic::x86_avx2_permd},
     {4, "+avx", Intrinsic::x86_avx_vpermilvar_ps},
     {4, "+ssse3", Intrinsic::x86_ssse3_pshuf_b_128}};
+constexpr WordPermutation armPermutations[] = {
+    {4, "+neon", Intrinsic::aarch64_neon_tbl1}};
+
+ArrayRef<WordPermutation> getPermutations(const Triple &triple) {
+  if (triple.isX86())
+    return x86Permutations;
+  return triple.isAArch64() ? ArrayRef(armPermutations)
+                            : ArrayRef<WordPermutation>();
+}
 
 /// Writes what stands for one permutation.
 class PermutationWriter {
@@ -57,15 +67,12 @@ PermutationWriter::PermutationWriter(CallInst *call,
                                      const TargetMachine &machine)
     : call(call), builder(call), lanes(call->getArgOperand(1)),
       count(cast<FixedVectorType>(lanes->getType())->getNumElements()) {
-  if (!machine.getTargetTriple().isX86())
-    return;
   const TargetSubtargetInfo &processor =
       *machine.getSubtargetImpl(*call->getFunction());
-  instruction = find_if(wordPermutations, [&](const WordPermutation &one) {
-    return one.lanes == count && processor.checkFeatures(one.feature.str());
-  });
-  if (instruction == std::end(wordPermutations))
-    instruction = nullptr;
+  for (const WordPermutation &one : getPermutations(machine.getTargetTriple()))
+    if (!instruction && one.lanes == count &&
+        processor.checkFeatures(one.feature.str()))
+      instruction = &one;
 }
 
 /// Of 32 bits, by the instruction. All but that for bytes take a lane modulo
@@ -78,7 +85,9 @@ Value *PermutationWriter::permuteWords(Value *vector) {
         instruction->id, {builder.CreateBitCast(vector, floats), lanes});
     return builder.CreateBitCast(moved, type);
   }
-  if (instruction->id != Intrinsic::x86_ssse3_pshuf_b_128)
+  bool isOfBytes = instruction->id == Intrinsic::x86_ssse3_pshuf_b_128 ||
+                   instruction->id == Intrinsic::aarch64_neon_tbl1;
+  if (!isOfBytes)
     return builder.CreateIntrinsic(instruction->id, {vector, lanes});
   // The bytes of a word are those of a lane, from the lowest on.
   auto *bytes = FixedVectorType::get(builder.getInt8Ty(), 4 * count);
@@ -94,8 +103,12 @@ Value *PermutationWriter::permuteWords(Value *vector) {
       builder.CreateShuffleVector(builder.CreateBitCast(which, bytes), lowest);
   which = builder.CreateOr(
       which, ConstantDataVector::get(builder.getContext(), offsets));
-  Value *moved = builder.CreateIntrinsic(
-      instruction->id, {builder.CreateBitCast(vector, bytes), which});
+  SmallVector<Type *> overloads;
+  if (instruction->id == Intrinsic::aarch64_neon_tbl1)
+    overloads.push_back(bytes);
+  Value *moved =
+      builder.CreateIntrinsic(instruction->id, overloads,
+                              {builder.CreateBitCast(vector, bytes), which});
   return builder.CreateBitCast(moved, type);
 }
 
