@@ -17,6 +17,9 @@ cmake_policy(VERSION 3.20...3.25)
 #          relative to the folder of the source, as SOURCES
 # OPTIONS  further options of pikoc, such as -I<folder> and -D<name>; it runs in
 #          the build folder, so paths are absolute
+#
+# Where the package has the runtime alone, as for another architecture, PIKO_PIKOC is a
+# pikoc that runs on the machine that builds (the one in PATH).
 function(piko_add_pipeline target)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "CPU;TUNED" "SOURCES;PIPES;OPTIONS")
   if(ARG_UNPARSED_ARGUMENTS)
@@ -41,6 +44,18 @@ function(piko_add_pipeline target)
     endif()
     get_filename_component(tuned ${ARG_TUNED} ABSOLUTE)
     list(APPEND ARG_OPTIONS --tuned=${tuned})
+  endif()
+
+  if(TARGET Piko::pikoc)
+    set(PIKO_PIKOC Piko::pikoc)
+  else()
+    find_program(PIKO_PIKOC pikoc DOC "Piko's compiler, for this machine")
+    if(NOT PIKO_PIKOC)
+      message(FATAL_ERROR "piko_add_pipeline: expected pikoc; set PIKO_PIKOC to it")
+    endif()
+  endif()
+  if(CMAKE_CROSSCOMPILING)
+    list(APPEND ARG_OPTIONS --arch=${CMAKE_SYSTEM_PROCESSOR})
   endif()
 
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/${target}.pipelines)
@@ -68,9 +83,9 @@ function(_piko_compile target folder source name)
   set(header ${folder}/${name}.h)
   add_custom_command(
     OUTPUT ${object} ${header}
-    COMMAND Piko::pikoc ${source} -o ${object} --header=${header}
+    COMMAND ${PIKO_PIKOC} ${source} -o ${object} --header=${header}
             --depfile=${object}.d ${ARGN}
-    DEPENDS ${source} Piko::pikoc
+    DEPENDS ${source} ${PIKO_PIKOC}
     DEPFILE ${object}.d
     COMMENT "Compiling pipeline ${name}"
     VERBATIM)

@@ -197,6 +197,11 @@ function(piko_add_unittest name)
   set_tests_properties(${name} PROPERTIES COST 10
     TIMEOUT ${PIKO_TEST_TIMEOUT} ENVIRONMENT OMP_WAIT_POLICY=passive)
 endfunction()
-if(BUILD_TESTING OR NOT DEFINED BUILD_TESTING)
+if(BUILD_TESTING AND CMAKE_CROSSCOMPILING)
+  # Debian has the library for the machine that builds, and its source for others.
+  set(PIKO_GTEST_SOURCE /usr/src/googletest/googletest CACHE PATH "GoogleTest's source")
+  set(INSTALL_GTEST OFF)
+  add_subdirectory(${PIKO_GTEST_SOURCE} ${PROJECT_BINARY_DIR}/googletest EXCLUDE_FROM_ALL)
+elseif(BUILD_TESTING OR NOT DEFINED BUILD_TESTING)
   find_package(GTest REQUIRED)
 endif()

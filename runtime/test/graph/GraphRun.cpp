@@ -391,8 +391,18 @@ static int32_t runGraph(pikort_pipeline *p) {
   return 0;
 }
 
+/// As the runtime leaves it: C++ says nothing of what is in a host's.
+static void clearPadding(std::vector<Item> &items) {
+  for (Item &item : items) {
+    char *padding = reinterpret_cast<char *>(&item.hops) + sizeof(item.hops);
+    std::memset(padding, 0, offsetof(Item, check) - offsetof(Item, hops) - 1);
+  }
+}
+
 GraphRun::GraphRun(Graph &graph) {
   current = &graph;
+  for (std::vector<Item> &items : graph.input)
+    clearPadding(items);
   pikort_program program{PIKORT_ABI_VERSION, "Graph", setup, runGraph};
   EXPECT_EQ(pikort_create(&program, &pipeline_), PIKORT_OK)
       << pikort_message(pipeline_);
