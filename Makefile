@@ -34,7 +34,7 @@ UNITE ?= ON
 PIPE ?= Fused
 
 .DELETE_ON_ERROR:
-.PHONY: abi all bench bench-gate build charts check check-all clean configure demo deps \
+.PHONY: abi all bench bench-gate build charts check check-aarch64 check-all clean configure demo deps \
   docs format gpu-bench gpu-kit lanes lint package-check packages site
 
 all: build
@@ -115,6 +115,11 @@ check: build
 # What says the same of more, or takes long, too.
 check-all: build
 	@PIKO_TEST_ALL=1 ctest --test-dir $(BUILD) -C all --output-on-failure \
+	  --parallel $(JOBS)
+
+# What runs of code for AArch64 under qemu-user, which takes half an hour.
+check-aarch64: build
+	@ctest --test-dir $(BUILD) -C aarch64 -R '^aarch64' --output-on-failure \
 	  --parallel $(JOBS)
 
 # Formatting, licence headers and paths (also part of `make check`), then

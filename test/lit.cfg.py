@@ -22,6 +22,7 @@ split-file. Substitutions:
   %compare_checked
                  the same on the targets that have checking mode
   %other_cxx     another C++ compiler, where one can use this build's runtime
+  %aarch64_cxx   a C++ compiler for AArch64, and %aarch64_run what runs its programs
   %cxx_host      compiler and flags that build a host of compiled pipelines
   %cxx_quick_host
                  the same after the precompiled header that such a host includes
@@ -37,9 +38,11 @@ split-file. Substitutions:
                  the same after a precompiled piko.h, for a file that includes
                  it first and whose options it does not depend on
 
+PIKO_TEST_AARCH64=aarch64 has %compare_targets run cases on AArch64 alone.
 PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
 that is so, `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
-is, `ptxas` where NVIDIA's assembler is, `chromium` and `doxygen` where these are, `asan` and `tsan` in
+is, `aarch64` where Debian's compiler for it and qemu are, `ptxas` where NVIDIA's
+assembler is, `chromium` and `doxygen` where these are, `asan` and `tsan` in
 builds with that sanitizer, `fork-server` where tools fork.
 """
 
@@ -147,7 +150,15 @@ if platform.machine() in ("x86_64", "AMD64"):
 test_driver = os.path.join(config.piko_binary_root, "lib", "libpiko-test-driver.so")
 
 
+# The processor that all cases are to run on, under an emulator, in place of all targets.
+aarch64 = os.environ.get("PIKO_TEST_AARCH64", "")
+aarch64_run = "qemu-aarch64 -L /usr/aarch64-linux-gnu"
+aarch64_runner = f"{aarch64_run} {config.piko_binary_root}/aarch64/bin/piko-run-capture"
+
+
 def compare_on(names):
+    if aarch64:
+        return f"piko-compare --targets {aarch64} --runner '{aarch64_runner}'"
     command = f"env PIKO_CUDA_DRIVER={test_driver} PIKO_TEST_DRIVER_SEED=2"
     command += f" piko-compare --gpu-threads 32 --targets {','.join(names)}"
     return command if all_tests else command + " --spread"
@@ -184,12 +195,17 @@ config.substitutions += [
     ("%cxx_ptx", " ".join(ptx)),
     ("%cxx", config.cxx),
     ("%other_cxx", other_cxx),
+    # What is no machine's own, such as GLM, is there last.
+    ("%aarch64_cxx", "aarch64-linux-gnu-g++ -idirafter /usr/include"),
+    ("%aarch64_run", aarch64_run),
 ]
 
 if all_tests:
     config.available_features.add("all")
 if os.path.exists(bunny):
     config.available_features.add("bunny")
+if shutil.which("aarch64-linux-gnu-g++") and shutil.which("qemu-aarch64"):
+    config.available_features.add("aarch64")
 if os.path.exists("/dev/nvidiactl"):
     config.available_features.add("gpu")
 if platform.machine() in ("x86_64", "AMD64"):

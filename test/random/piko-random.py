@@ -57,6 +57,8 @@ def runner_of(args, passes, first, **options):
     target = gpu_options(first, args.gpu) if args.gpu else ()
     if args.cpu:
         target = ["--cpu", args.cpu]
+    if args.runner:
+        target += ["--runner", args.runner]
     return Runner(args.tool, args.mlir, passes, strip=args.strip, target=target, **options)
 
 
@@ -76,7 +78,8 @@ def command_of(args, first, seed):
     options = [f"--{name} {value}" for name, value in [
         ("features", args.features), ("without", args.without),
         ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip),
-        ("cpu", args.cpu), ("gpu", args.gpu)] if value]
+        ("cpu", args.cpu), ("gpu", args.gpu),
+        ("runner", args.runner and f"'{args.runner}'")] if value]
     return " ".join([f"{sys.argv[0]} reduce --tool {args.tool} --seed {seed}", *options] +
                     ["--mlir"] * args.mlir)
 
@@ -161,6 +164,8 @@ def main():
                              "after $PIKO_CUDA_DRIVER")
     parser.add_argument("--cpu", default="",
                         help="the processor to compile for (this machine's)")
+    parser.add_argument("--runner", default="", metavar="COMMAND",
+                        help="runs code for --cpu aarch64: see piko-compare")
     parser.add_argument("--strip", type=int, default=0,
                         help="primitives of a source in a strip (all)")
     parser.add_argument("--keep", metavar="FOLDER",

@@ -38,6 +38,8 @@ void addCaseOptions(CommandLine &line, Case &into) {
                  "primitives of a source in a strip (0, all)");
   line.addNumber("--budget", "BYTES", into.budget,
                  "what bins may hold (0, no budget)");
+  line.addText("--capture", "FILE", into.capture,
+               "what pikort_capture has written, in place of made-up input");
   line.add_flag("--wide", into.wide,
                 "input of all bits, infinities and NaNs among it");
 }
@@ -50,6 +52,16 @@ std::string read(CommandLine &line, const std::vector<std::string> &words) {
   return *help;
 }
 
+/// Takes what --cpu or a name of --targets says apart.
+void setProcessor(Target &target, const std::string &name) {
+  const std::string other = "aarch64";
+  target.cpu = name;
+  if (name != other && !name.starts_with(other + ":"))
+    return;
+  target.arch = other;
+  target.cpu = name == other ? "" : name.substr(other.size() + 1);
+}
+
 /// A name of --targets, with the options for a GPU that all of them share.
 Target readTarget(const std::string &name, const piko::GPUOptions &gpu) {
   Target target{name, "native", gpu};
@@ -58,12 +70,13 @@ Target readTarget(const std::string &name, const piko::GPUOptions &gpu) {
     target.gpu.target = *kind;
     return target;
   }
-  target.cpu = name;
-  llvm::Expected<piko::Processor> processor = piko::resolveProcessor(name);
+  setProcessor(target, name);
+  llvm::Expected<piko::Processor> processor = piko::resolveProcessor(
+      target.cpu, llvm::cantFail(piko::resolveTriple(target.arch)));
   if (name.empty() || !processor)
     throw std::runtime_error(
-        "expected --targets with cpu, gpu-on-cpu, cuda or names of processors "
-        "between commas, but got '" +
+        "expected --targets with cpu, gpu-on-cpu, cuda, aarch64 or names of "
+        "processors between commas, but got '" +
         name + "'" +
         (processor ? "" : ": " + llvm::toString(processor.takeError())));
   return target;
@@ -72,8 +85,11 @@ Target readTarget(const std::string &name, const piko::GPUOptions &gpu) {
 /// Those of --targets, or the one of --target and --cpu.
 std::vector<Target> readTargets(const std::optional<std::string> &names,
                                 const Target &one) {
-  if (!names)
-    return {one};
+  if (!names) {
+    Target only = one;
+    setProcessor(only, one.cpu);
+    return {only};
+  }
   if (one.gpu.target != piko::GPUTarget::None || one.cpu != Target().cpu)
     throw std::runtime_error(
         "expected --targets, or --target and --cpu, but got both");
@@ -142,8 +158,8 @@ static void addTargetOptions(CommandLine &line, Target &one,
   line.addText(
       "--targets", "NAME,..",
       [&](const std::string &names) { targets = names; },
-      "what each case runs on: cpu, gpu-on-cpu, cuda, or processors by LLVM's "
-      "names");
+      "what each case runs on: cpu, gpu-on-cpu, cuda, processors by LLVM's "
+      "names, aarch64, or aarch64:NAME for one of these");
   line.addText(
       "--target", "TARGET",
       [&](const std::string &name) {
@@ -186,6 +202,13 @@ static void addRunOptions(CommandLine &line, Options &options) {
                  mostOfAll);
   line.addNumber("--timeout", "SECONDS", options.timeout, "of a case (none)");
   line.addText(
+      "--runner", "COMMAND",
+      [&](const std::string &text) {
+        std::istringstream words(text);
+        options.runner = {std::istream_iterator<std::string>(words), {}};
+      },
+      "for aarch64: piko-run-capture with its emulator, words between spaces");
+  line.addText(
       "--tolerance", "X",
       [&](const std::string &text) {
         options.tolerance =
@@ -222,6 +245,9 @@ Options parseOptions(int argc, char **argv) {
   if (options.reference.empty())
     options.reference = options.file;
   options.targets = readTargets(targets, one);
+  for (const Target &target : options.targets)
+    if (!target.arch.empty() && options.runner.empty())
+      throw std::runtime_error("expected --runner for " + target.arch);
   return options;
 }
 

@@ -31,6 +31,9 @@ struct Case {
   int64_t strip = 0;
   /// What bins may hold, in bytes; 0 = no budget.
   int64_t budget = 0;
+  /// A file that pikort_capture has written: the input in place of all the above but
+  /// `pipe`. Empty = none.
+  std::string capture;
 
   int64_t count(size_t source) const {
     return counts[source < counts.size() ? source : counts.size() - 1];
@@ -41,11 +44,14 @@ struct Case {
 struct Target {
   /// As --targets names it; empty where there is but one.
   std::string name;
-  /// The processor, as pikoc has it.
+  /// The processor, as pikoc has it; of another architecture after its name and a
+  /// colon, until that is in `arch`.
   std::string cpu = "native";
   /// --target gpu-on-cpu, --gpu-threads N (0 = as the stage says), --gpu-seed N,
   /// --gpu-blocks N (0 = as many as there are units), --gpu-chip NAME,..
   piko::GPUOptions gpu = {};
+  /// Where this machine does not run its code, as pikoc has it.
+  std::string arch = {};
 };
 
 struct Options {
@@ -61,6 +67,9 @@ struct Options {
   std::vector<int> threads{1, 2, 7};
   int runs = 3;
   unsigned timeout = 0;
+  /// The words of a command that begins piko-run-capture on a machine of another
+  /// architecture, or under an emulator.
+  std::vector<std::string> runner;
   /// The largest relative difference of a number of a pipeline that has a stage
   /// which is not strict. Without it, differences are reported, and are right.
   std::optional<double> tolerance;

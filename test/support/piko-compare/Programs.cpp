@@ -54,11 +54,6 @@ template <class F> F *find(JITCode &code, const std::string &name) {
   return *found;
 }
 
-struct CompiledPipeline {
-  std::string code;
-  bool isStrict;
-};
-
 } // namespace
 
 struct Programs::Implementation {
@@ -303,12 +298,16 @@ static void checkMachine(const Processor &processor) {
 /// Compiles unless that was done before.
 CompiledPipeline Programs::Implementation::find(const std::string &pipe,
                                                 const Target &target) {
-  llvm::Expected<Processor> processor = resolveProcessor(target.cpu);
+  llvm::Expected<Processor> processor =
+      resolveProcessor(target.cpu, llvm::cantFail(resolveTriple(target.arch)));
   if (!processor)
     throw std::runtime_error(llvm::toString(processor.takeError()));
-  checkMachine(*processor);
-  TargetOptions machine{target.cpu, options.getOptLevel(target),
-                        JITCode::getSanitizer()};
+  TargetOptions machine{target.cpu, options.getOptLevel(target)};
+  machine.arch = target.arch;
+  if (target.arch.empty()) {
+    checkMachine(*processor);
+    machine.sanitizer = JITCode::getSanitizer();
+  }
   ObjectOptions object{
       .source = {.file = options.file,
                  .pipeName = pipe,
@@ -347,6 +346,11 @@ Program Programs::compile(const std::string &pipe, const Target &target) {
       std::pair<std::shared_ptr<std::string>, std::shared_ptr<JITCode>>>(name,
                                                                          code);
   return program;
+}
+
+CompiledPipeline Programs::compileObject(const std::string &pipe,
+                                         const Target &target) {
+  return self->find(pipe, target);
 }
 
 Program Programs::reference(const std::string &pipe) {

@@ -33,6 +33,12 @@ struct Program {
   bool isStrict = true;
 };
 
+/// The object of a pipeline, with the functions `pipe`.setup and `pipe`.run.
+struct CompiledPipeline {
+  std::string code;
+  bool isStrict;
+};
+
 class Programs {
 public:
   /// Throws std::runtime_error, as do all functions.
@@ -43,6 +49,7 @@ public:
   std::vector<std::string> names() const;
   /// At most once for each.
   Program compile(const std::string &pipe, const Target &target);
+  CompiledPipeline compileObject(const std::string &pipe, const Target &target);
   Program reference(const std::string &pipe);
 
 private:

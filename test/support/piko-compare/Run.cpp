@@ -2,6 +2,8 @@
 
 #include "Run.h"
 
+#include "Piko/Replay/CaptureFile.h"
+
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -70,6 +72,17 @@ void Run::check(int32_t status) {
 Run::Run(Program made, const Case &input)
     : program(std::move(made)), input(input) {
   check(pikort_create(&program.program, &pipeline));
+  if (input.capture.empty()) {
+    makeInput();
+    return;
+  }
+  auto capture = replay::readCapture(input.capture);
+  if (!capture)
+    throw std::runtime_error(capture.error().message);
+  given = std::move(*capture);
+}
+
+void Run::makeInput() {
   check(pikort_set_domain(pipeline, int32_t(input.domain.size()),
                           input.domain.data()));
   if (input.loopLimit)
@@ -118,6 +131,12 @@ std::string Run::makeRecords(int32_t index, int64_t count,
 }
 
 void Run::bind() {
+  if (given) {
+    bound = given;
+    if (std::string wrong = bound->bind(pipeline); !wrong.empty())
+      throw std::runtime_error(input.capture + ": " + wrong);
+    return;
+  }
   for (int32_t i = 0; i < pikort_state_count(pipeline); ++i) {
     pikort_state_info info;
     check(pikort_get_state_info(pipeline, i, &info));
@@ -137,6 +156,8 @@ void Run::bind() {
 }
 
 void Run::divide(int64_t strip, int64_t budget) {
+  if (given)
+    return;
   check(pikort_set_strip_size(pipeline, strip));
   check(pikort_set_memory_budget(pipeline, budget));
 }
@@ -151,6 +172,11 @@ void Run::recordOwners() {
           run.threadsOf[{unit->stage, bin}].insert(unit->thread);
       },
       this));
+}
+
+void Run::capture(const std::string &path) {
+  bind();
+  check(pikort_capture(pipeline, path.c_str()));
 }
 
 replay::Outcome Run::operator()(int threads) {

@@ -6,7 +6,7 @@
 // input that is half; the rest is any number, the special ones among them, but in
 // fields whose names begin with `exact`. An integer field of the name `serial`
 // numbers the primitives. Buffers that no source sizes get 64 elements, constants
-// one value.
+// one value. Of a case with a capture the input is what that holds.
 
 #ifndef PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
 #define PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H
@@ -15,6 +15,7 @@
 #include "Programs.h"
 
 #include "Piko/Replay/Outcome.h"
+#include "pikort/capture.h"
 
 #include <map>
 #include <mutex>
@@ -30,6 +31,8 @@ public:
   /// 0 = not said.
   void divide(int64_t strip, int64_t budget);
   piko::replay::Outcome operator()(int threads);
+  /// Writes what a run takes to a file.
+  void capture(const std::string &path);
 
   /// Of each bin of each stage, the threads that ran a part of it.
   using Owners = std::map<std::pair<std::string, int64_t>, std::set<int32_t>>;
@@ -41,6 +44,7 @@ private:
   void check(int32_t status);
   std::string makeRecords(int32_t record, int64_t count,
                           const std::string &who);
+  void makeInput();
   void bind();
 
   Program program;
@@ -49,6 +53,7 @@ private:
   std::mutex ownersMutex;
   Owners threadsOf;
   std::map<std::string, std::string> initial, memory;
+  std::optional<piko::rt::Capture> given, bound; ///< As it is read; in use.
 };
 
 #endif // PIKO_TEST_TOOLS_PIKO_COMPARE_RUN_H

@@ -12,7 +12,8 @@
 // others by the names that LLVM has for them, `gpu-on-cpu` and `cuda`. The file is
 // read once, and the reference executor runs once. What differs is said of each
 // target by name, what several do alike once; a target that cannot compile or run a
-// case has an error, and the others go on.
+// case has an error, and the others go on. `aarch64` is code for another machine,
+// which --runner begins.
 //
 // Of a pipeline with a stage that is not strict, all runs on a target must give the
 // same bits, and how far these are from the reference executor's is reported field
@@ -21,6 +22,7 @@
 
 #include "Options.h"
 #include "Programs.h"
+#include "Remote.h"
 #include "Report.h"
 #include "Run.h"
 
@@ -31,9 +33,11 @@
 #include "Piko/Support/OutOfMemory.h"
 #include "Piko/Support/OutputFile.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -56,15 +60,21 @@ public:
     runs = 1;
   }
 
-  /// True if all is equal. Throws if it cannot be run.
-  bool compare(const Case &input, Outcome expected, Programs &programs);
+  /// True if all is equal. Throws if it cannot be run. `reference` has the input.
+  bool compare(const Case &input, Outcome expected, Programs &programs,
+               Run &reference);
 
   bool isStrict = true;
   /// The messages of runs that stopped, empty for those that did not.
   std::set<std::string> errors;
 
 private:
-  bool acceptMeasured(Outcome &expected, Run &compiled);
+  /// What a run with so many threads leaves.
+  using Runs = std::function<Outcome(int)>;
+  bool acceptMeasured(Outcome &expected, const Runs &compiled);
+  bool compareRuns(Outcome expected, const Runs &compiled);
+  bool compareRemotely(const Case &input, const Outcome &expected,
+                       Programs &programs, Run &reference);
   void reportOwners(const Run &compiled);
   void say(const std::string &line) { report.add(target.name, line); }
 
@@ -77,7 +87,7 @@ private:
 
 /// What a run should give that need not be strict: what it gives itself, if that
 /// is near enough to what the reference executor does. True if it is.
-bool TargetRun::acceptMeasured(Outcome &expected, Run &compiled) {
+bool TargetRun::acceptMeasured(Outcome &expected, const Runs &compiled) {
   Outcome actual = compiled(threads[0]);
   if (!expected.error.empty() || !actual.error.empty())
     return true; // to be compared as they are
@@ -103,14 +113,7 @@ void TargetRun::reportOwners(const Run &compiled) {
   }
 }
 
-bool TargetRun::compare(const Case &input, Outcome expected,
-                        Programs &programs) {
-  Program program = programs.compile(input.pipe, target);
-  isStrict = program.isStrict;
-  Run compiled(program, input);
-  compiled.divide(input.strip, input.budget);
-  if (options.owners)
-    compiled.recordOwners();
+bool TargetRun::compareRuns(Outcome expected, const Runs &compiled) {
   bool equal = isStrict || acceptMeasured(expected, compiled);
   for (int count : threads)
     for (int run = 0; run < runs; ++run) {
@@ -122,6 +125,38 @@ bool TargetRun::compare(const Case &input, Outcome expected,
         say(std::to_string(count) + " threads, run " + std::to_string(run) +
             ": " + difference);
     }
+  return equal;
+}
+
+/// All runs begin where the reference executor's did.
+bool TargetRun::compareRemotely(const Case &input, const Outcome &expected,
+                                Programs &programs, Run &reference) {
+  CompiledPipeline compiled = programs.compileObject(input.pipe, target);
+  isStrict = compiled.isStrict;
+  WorkFolder folder;
+  reference.divide(input.strip, input.budget);
+  reference.capture(folder / "capture");
+  reference.divide(0, 0);
+  std::vector<Outcome> outcomes = runRemotely(
+      options.runner, compiled.code, input.pipe, folder / "capture", threads);
+  runs = 1;
+  return compareRuns(expected, [&](int count) {
+    auto place = std::find(threads.begin(), threads.end(), count);
+    return outcomes[size_t(place - threads.begin())];
+  });
+}
+
+bool TargetRun::compare(const Case &input, Outcome expected, Programs &programs,
+                        Run &reference) {
+  if (!target.arch.empty())
+    return compareRemotely(input, expected, programs, reference);
+  Program program = programs.compile(input.pipe, target);
+  isStrict = program.isStrict;
+  Run compiled(program, input);
+  compiled.divide(input.strip, input.budget);
+  if (options.owners)
+    compiled.recordOwners();
+  bool equal = compareRuns(std::move(expected), std::ref(compiled));
   reportOwners(compiled);
   return equal;
 }
@@ -182,7 +217,7 @@ bool compare(const Options &options, const Case &input, Programs &programs,
     TargetRun run(options, target, report);
     bool isEqual = false;
     try {
-      isEqual = run.compare(input, expected, programs);
+      isEqual = run.compare(input, expected, programs, reference);
     } catch (const std::exception &error) {
       if (target.name.empty())
         throw;
