@@ -41,9 +41,10 @@ split-file. Substitutions:
 PIKO_TEST_AARCH64=aarch64 has %compare_targets run cases on AArch64 alone.
 PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
 that is so, `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
-is, `aarch64` where Debian's compiler for it and qemu are, `ptxas` where NVIDIA's
-assembler is, `chromium` and `doxygen` where these are, `asan` and `tsan` in
-builds with that sanitizer, `fork-server` where tools fork.
+is, `aarch64` where Debian's compiler for it and qemu are, `on-aarch64` where
+PIKO_TEST_AARCH64 is set, `ptxas` where NVIDIA's assembler is, `chromium` and `doxygen`
+where these are, `asan` and `tsan` in builds with that sanitizer, `fork-server` where
+tools fork.
 """
 
 import atexit
@@ -206,6 +207,8 @@ if os.path.exists(bunny):
     config.available_features.add("bunny")
 if shutil.which("aarch64-linux-gnu-g++") and shutil.which("qemu-aarch64"):
     config.available_features.add("aarch64")
+if aarch64:
+    config.available_features.add("on-aarch64")
 if os.path.exists("/dev/nvidiactl"):
     config.available_features.add("gpu")
 if platform.machine() in ("x86_64", "AMD64"):

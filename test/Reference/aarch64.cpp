@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
 // The reference executor for AArch64, by another compiler, gives what it gives here;
 // and it refuses a program that contracts, as GCC does there unless it is told not to.
 //

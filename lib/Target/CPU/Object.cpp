@@ -17,6 +17,7 @@
 #include "Passes/WidenGathers.h"
 #include "Passes/WidenMasks.h"
 #include "Piko/Target/CodeGeneration.h"
+#include "Piko/Target/KeepZeros.h"
 
 #include "llvm/ExecutionEngine/Orc/ExecutionUtils.h"
 #include "llvm/IR/IRBuilder.h"
@@ -88,6 +89,8 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
                                         int optLevel, Sanitizer sanitizer) {
   ModulePassManager passes;
   passes.addPass(LowerArithmeticPass(machine));
+  if (!machine.getTargetTriple().isX86())
+    passes.addPass(createModuleToFunctionPassAdaptor(KeepZerosPass()));
   if (machine.getTargetTriple().isX86() && optLevel > 0) {
     passes.addPass(createModuleToFunctionPassAdaptor(SelectBitsPass()));
     passes.addPass(

@@ -5,10 +5,9 @@
 #include "Piko/Target/PTX.h"
 #include "Piko/Target/Approximation.h"
 #include "Piko/Target/CodeGeneration.h"
+#include "Piko/Target/KeepZeros.h"
 
-#include "llvm/IR/InstIterator.h"
 #include "llvm/IR/IntrinsicsNVPTX.h"
-#include "llvm/IR/PassManager.h"
 #include "llvm/MC/TargetRegistry.h"
 #include "llvm/Support/TargetSelect.h"
 
@@ -85,51 +84,6 @@ static void alignBlockMemory(Module &module) {
     }
 }
 
-/// Whether a number is a constant other than zero.
-static bool isNonZero(const Value *value) {
-  auto *number = dyn_cast<ConstantFP>(value);
-  return number && !number->isZero();
-}
-
-/// Whether a choice is the smaller or the larger one of two numbers.
-static bool isMinMax(const SelectInst &choice) {
-  auto *test = dyn_cast<FCmpInst>(choice.getCondition());
-  if (!test || !choice.getType()->isFloatingPointTy())
-    return false;
-  const Value *a = test->getOperand(0), *b = test->getOperand(1),
-              *first = choice.getTrueValue(), *second = choice.getFalseValue();
-  return ((a == first && b == second) || (a == second && b == first)) &&
-         !isNonZero(a) && !isNonZero(b);
-}
-
-namespace {
-/// The code generator takes `x < 0 ? x : 0` for a minimum (its test for zeros
-/// leaves out strict comparisons), and PTX's minimum of 0 and -0 is -0. So what
-/// may choose between zeros chooses between integers.
-struct KeepZeros : PassInfoMixin<KeepZeros> {
-  PreservedAnalyses run(Function &function, FunctionAnalysisManager &) {
-    SmallVector<SelectInst *> choices;
-    for (Instruction &each : instructions(function))
-      if (auto *choice = dyn_cast<SelectInst>(&each);
-          choice && isMinMax(*choice))
-        choices.push_back(choice);
-    for (SelectInst *choice : choices) {
-      IRBuilder<> builder(choice);
-      Type *type = choice->getType(),
-           *bits = builder.getIntNTy(type->getScalarSizeInBits());
-      Value *chosen = builder.CreateSelect(
-          choice->getCondition(),
-          builder.CreateBitCast(choice->getTrueValue(), bits),
-          builder.CreateBitCast(choice->getFalseValue(), bits));
-      choice->replaceAllUsesWith(builder.CreateBitCast(chosen, type));
-      choice->eraseFromParent();
-    }
-    return choices.empty() ? PreservedAnalyses::all()
-                           : PreservedAnalyses::none();
-  }
-};
-} // namespace
-
 Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
                                         int optLevel) {
   auto machine =
@@ -139,7 +93,7 @@ Expected<std::string> piko::generatePTX(Module &module, StringRef processor,
   replaceApproximations(module, writeApproximation);
   alignBlockMemory(module);
   ModulePassManager last;
-  last.addPass(createModuleToFunctionPassAdaptor(KeepZeros()));
+  last.addPass(createModuleToFunctionPassAdaptor(KeepZerosPass()));
   return emitCode(module, **machine, {.level = optLevel},
                   CodeGenFileType::AssemblyFile, std::move(last));
 }
