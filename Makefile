@@ -14,6 +14,8 @@
 #                    card, by estimates (GPU_BENCH=--quick; docs/GPU.md)
 # And for a machine with a card that has nothing else:
 #   make gpu-kit     packs BUILD/gpu-kit.tar.zst, which takes ten minutes
+# Code for AArch64, under an emulator, of which `make check` runs a part:
+#   make check-aarch64   most of an hour
 # All documents and an API reference as a static site, which needs no build:
 #   make site     in half a minute; says where the start page is
 # For who gives Piko to others:
@@ -117,7 +119,7 @@ check-all: build
 	@PIKO_TEST_ALL=1 ctest --test-dir $(BUILD) -C all --output-on-failure \
 	  --parallel $(JOBS)
 
-# What runs of code for AArch64 under qemu-user, which takes half an hour.
+# All that is tested of code for AArch64, under qemu-user.
 check-aarch64: build
 	@ctest --test-dir $(BUILD) -C aarch64 -R '^aarch64' --output-on-failure \
 	  --parallel $(JOBS)

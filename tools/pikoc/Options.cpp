@@ -158,9 +158,12 @@ void addSourceOptions(CommandLine &line, Options &options) {
 }
 
 void addTargetOptions(CommandLine &line, Options &options) {
-  line.addText("--arch", "NAME", options.arch,
-               "the processor's architecture, x86_64 or aarch64 (this "
-               "machine's)");
+  line.addChoice(
+      "--arch", "NAME",
+      {{"x86_64", "vectors of SSE, AVX2 or AVX-512"},
+       {"aarch64", "64-bit Arm, with vectors of NEON"}},
+      [&](const std::string &word) { options.arch = word; },
+      "the processor's architecture (this machine's):");
   line.addText(
       "--cpu", "NAME,...", options.cpu,
       "the processor to make code for, as clang names them, or native "
