@@ -18,9 +18,9 @@ protected:
     std::memset(reinterpret_cast<void *>(memory), 0, 64);
     for (CUstream *it : {&stream, &inner})
       ASSERT_EQ(cuStreamCreate(it, CU_STREAM_NON_BLOCKING), CUDA_SUCCESS);
-    step = load(source, "step");
-    ASSERT_NE(step, nullptr);
-    ASSERT_EQ(cuModuleGetFunction(&choose, module, "choose"), CUDA_SUCCESS);
+    ASSERT_NE(load(source, "step"), nullptr);
+    step = loadForCapture("step");
+    choose = loadForCapture("choose");
   }
   void TearDown() override {
     if (!lost) {

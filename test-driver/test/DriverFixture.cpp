@@ -74,6 +74,18 @@ CUfunction DriverTest::load(const std::string &source, const char *name) {
   return function;
 }
 
+CUfunction DriverTest::loadForCapture(const char *name) {
+  CUfunction function = nullptr;
+  int registers = 0;
+  EXPECT_EQ(cuModuleGetFunction(&function, module, name), CUDA_SUCCESS)
+      << pikoTestDriverError();
+  EXPECT_EQ(
+      cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, function),
+      CUDA_SUCCESS)
+      << pikoTestDriverError();
+  return function;
+}
+
 std::string DriverTest::loadError(const std::string &source) {
   std::string text(1000, '\0');
   CUjit_option options[] = {CU_JIT_ERROR_LOG_BUFFER,

@@ -29,6 +29,9 @@ protected:
                             const std::string &before = "");
   /// Loads a module; the test's last. Fails the test with the error's text.
   CUfunction load(const std::string &source, const char *name = "k");
+  /// A function of that module that a capture may launch: in mode `lazy` its
+  /// handle alone is not enough.
+  CUfunction loadForCapture(const char *name);
   /// What loading says; empty if it works.
   std::string loadError(const std::string &source);
   /// Unloads what `load` has loaded.

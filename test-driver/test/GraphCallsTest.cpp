@@ -20,8 +20,8 @@ protected:
     ASSERT_EQ(cuStreamCreate(&stream, CU_STREAM_NON_BLOCKING), CUDA_SUCCESS);
     // Kernels that add [in], and twice that, to [out].
     ASSERT_NE(load(adding("k", 1) + adding("twice", 2)), nullptr);
-    ASSERT_EQ(cuModuleGetFunction(&once, module, "k"), CUDA_SUCCESS);
-    ASSERT_EQ(cuModuleGetFunction(&twice, module, "twice"), CUDA_SUCCESS);
+    once = loadForCapture("k");
+    twice = loadForCapture("twice");
   }
   void TearDown() override {
     if (!lost) {
