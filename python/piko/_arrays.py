@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Optional, Tuple, cast
 
@@ -83,6 +85,15 @@ def view_of(
     return flat.view(base).reshape((*shape, *inner)), lease
 
 
+def leading_rank(shape: Tuple[int, ...], per_record: int) -> int:
+    """How many dimensions count records, where the others have the numbers of one; 0 if
+    there are none such."""
+    for rank in range(len(shape), 0, -1):
+        if math.prod(shape[rank:]) == per_record:
+            return rank
+    return 0
+
+
 def _fit(dtype: DType, given: DType, shape: Tuple[int, ...], who: str) -> int:
     """The number of records that an array has; ValueError where it has none."""
     if dtype.fields and given.fields:
@@ -101,15 +112,14 @@ def _fit(dtype: DType, given: DType, shape: Tuple[int, ...], who: str) -> int:
     misfit = find_misfit(scalar, given)
     if misfit:
         raise ValueError(f"{who}: {misfit.removeprefix('the record: ')}")
-    numbers = dtype.itemsize // scalar.itemsize
-    if shape and numbers == 1 and len(shape) == 1:
-        return shape[0]
-    if len(shape) < 2 or int(np.prod(shape[1:])) != numbers:
+    per_record = dtype.itemsize // scalar.itemsize
+    rank = leading_rank(shape, per_record)
+    if not rank:
+        wanted = "(N,), a number" if per_record == 1 else f"(N, {per_record}), a row"
         raise ValueError(
-            f"{who}: expected shape (N, {numbers}), a row for each record, but got"
-            f" {shape}"
+            f"{who}: expected shape {wanted} for each record, but got {shape}"
         )
-    return shape[0]
+    return math.prod(shape[:rank])
 
 
 def _take_numpy(array: Array, dtype: DType, who: str, writes: bool) -> Bound:
@@ -176,6 +186,26 @@ def _take_dlpack(value: Any, dtype: DType, who: str, writes: bool) -> Bound:
     return Bound(array, tensor.address, count, on_device)
 
 
+def check_numbers(value: Any, who: str) -> None:
+    """TypeError for what NumPy takes for a number with a loss, or for NaN: None, and
+    numbers that are complex. In sequences and mappings, too."""
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        value = value.ravel().tolist()
+    if isinstance(value, (list, tuple)):
+        for one in value:
+            if not isinstance(one, (float, int)):
+                check_numbers(one, who)
+        return
+    is_real = isinstance(value, numbers.Real)
+    is_complex = isinstance(value, numbers.Complex) and not is_real
+    if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+        raise TypeError(f"{who}: expected real numbers, but got {value.dtype}")
+    if value is None or is_complex:
+        raise TypeError(f"{who}: expected real numbers, but got {value!r}")
+
+
 def convert(value: Any, dtype: DType) -> Array:
     """A sequence, or a number, as an array of plain numbers; ValueError where an integer
     does not fit, or a fraction would be lost."""
@@ -196,12 +226,12 @@ def assign(to: Array, value: Any, path: str = "") -> None:
     """Sets numbers or records; of a mapping, the fields that it has. ValueError or
     TypeError where that cannot be."""
     if not to.dtype.fields:
-        numbers = convert(value, to.dtype)
+        made = convert(value, to.dtype)
         try:
-            to[...] = numbers
+            to[...] = made
         except ValueError:
             raise ValueError(
-                f"expected shape {to.shape}, but got {numbers.shape}"
+                f"expected shape {to.shape}, but got {made.shape}"
             ) from None
     elif isinstance(value, Mapping):
         for name, part in value.items():
@@ -230,6 +260,7 @@ def take_array(value: Any, dtype: DType, who: str, writes: bool) -> Bound:
         return _take_cuda(value, dtype, who, writes)
     if hasattr(value, "__dlpack__") and hasattr(value, "__dlpack_device__"):
         return _take_dlpack(value, dtype, who, writes)
+    check_numbers(value, who)
     try:
         base = dtype.subdtype[0] if dtype.subdtype else dtype
         array = np.array(value, base, order="C") if base.fields else convert(value, base)

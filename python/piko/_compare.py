@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any, Iterator, List, Optional, Tuple
 
 import numpy as np
 
+from ._arrays import leading_rank
 from ._errors import RunError
 from ._pipeline import Array, Pipeline
 from ._progress import Progress
-from ._records import DType
+from ._records import DType, scalar_of
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,17 @@ class Difference:
         )
 
 
+def _drop_names(error: Optional[str]) -> Optional[str]:
+    """How a run failed, without names: the reference executor knows those of classes,
+    others those of stages."""
+    if error is None:
+        return None
+    return re.sub(r"^(pipeline '[^']*': )?stage '[^']*'", "stage", error)
+
+
 @dataclass(frozen=True)
 class Comparison:
-    """What two runs have left; true where that is the same."""
+    """What two runs have left; true where that is the same, or both failed alike."""
 
     target: str
     against: str
@@ -48,17 +58,20 @@ class Comparison:
     actual_error: Optional[str] = None
 
     def __bool__(self) -> bool:
-        return not self.differences and self.expected_error == self.actual_error
+        errors = [_drop_names(one) for one in (self.expected_error, self.actual_error)]
+        return not self.differences and errors[0] == errors[1]
 
     def __str__(self) -> str:
-        if self:
-            return f"{self.target} against {self.against}: equal"
-        lines = [f"{self.target} against {self.against}: different"]
-        if self.expected_error != self.actual_error:
-            lines.append(
-                f"  expected {self.expected_error or 'no error'}, but got"
-                f" {self.actual_error or 'none'}"
-            )
+        both = f"{self.target} against {self.against}"
+        failed = self.expected_error is not None or self.actual_error is not None
+        if self and not failed:
+            return f"{both}: equal"
+        lines = [f"{both}: {'both failed' if self else 'different'}"]
+        if failed:
+            lines += [
+                f"  {self.against}: {self.expected_error or 'no error'}",
+                f"  {self.target}: {self.actual_error or 'no error'}",
+            ]
         lines += [f"  {one}" for one in self.differences]
         return "\n".join(lines)
 
@@ -137,6 +150,17 @@ def _run_copy(pipe: Pipeline, other: Pipeline) -> Optional[str]:
     return None
 
 
+def _records_of(array: Array, dtype: DType) -> Array:
+    """What was bound as plain numbers as the records that they are."""
+    scalar = scalar_of(dtype)
+    if array.dtype.fields or scalar is None:
+        return array
+    base, shape = dtype.subdtype or (dtype, ())
+    rank = leading_rank(array.shape, dtype.itemsize // scalar.itemsize)
+    flat: Array = np.ascontiguousarray(array).reshape(-1).view(base)
+    return flat.reshape((*array.shape[:rank], *shape))
+
+
 def has_memory(pipe: Pipeline, name: str) -> bool:
     """Whether a buffer is bound; what no kernel uses need not be."""
     bound = {one[0]: one[5] for one in pipe._core.states()}
@@ -155,6 +179,9 @@ def compare(
     """
     if not isinstance(pipe, Pipeline):
         raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
+    if not isinstance(against, str):
+        kind = type(against).__name__
+        raise TypeError(f"against: expected the name of a target, but got {kind}")
     if not tolerance >= 0:
         raise ValueError(f"expected a tolerance of at least 0, but got {tolerance}")
     with Progress(f"comparing {pipe.name} with {against}"):
@@ -162,8 +189,11 @@ def compare(
 
 
 def _compare(pipe: Pipeline, against: str, tolerance: float) -> Comparison:
-    first = Pipeline(pipe.program.with_target(against))
-    second = Pipeline(pipe.program)
+    try:
+        program = pipe.program.with_target(against)
+    except ValueError as error:
+        raise ValueError(re.sub("^target: ", "against: ", str(error))) from None
+    first, second = Pipeline(program), Pipeline(pipe.program)
     expected_error = _run_copy(pipe, first)
     actual_error = _run_copy(pipe, second)
     differences: List[Difference] = []
@@ -171,8 +201,9 @@ def _compare(pipe: Pipeline, against: str, tolerance: float) -> Comparison:
         for name, state in pipe._states.items():
             if state.kind == "constant" or not has_memory(second, name):
                 continue
-            rank = state.rank
-            expected, actual = first.read(name), second.read(name)
+            expected = _records_of(first.read(name), state.dtype)
+            actual = _records_of(second.read(name), state.dtype)
+            rank = expected.ndim - len(state.dtype.shape)
             for keys, field in _leaves(state.dtype):
                 a, b = expected, actual
                 for key in keys:
@@ -188,5 +219,9 @@ def _compare(pipe: Pipeline, against: str, tolerance: float) -> Comparison:
                 if found:
                     differences.append(found)
     return Comparison(
-        pipe.program.target, against, tuple(differences), expected_error, actual_error
+        pipe.program.target,
+        against,
+        tuple(differences),
+        expected_error,
+        actual_error,
     )

@@ -96,11 +96,18 @@ class _Options:
 def _check_argument(status: int, compiler: _core.Compiler) -> None:
     if status:
         said = compiler.diagnostics().removeprefix("error: ").rstrip("\n")
-        # As pikoc says it.
-        raise ValueError(re.sub(r"^(option '([\w-]+)': )--\2: ", r"\1", said))
+        raise ValueError(_in_python(said))
+
+
+def _in_python(said: str) -> str:
+    """What the compiler says of an option, of the argument of compile's."""
+    match = re.match(r"option '([\w-]+)': (?:--\1: )?", said)
+    return f"{_parameter(match[1])}: {said[match.end():]}" if match else said
 
 
 _INVALID_ARGUMENT, _OUT_OF_MEMORY = 1, 3
+# What is in texts, and hardly in paths.
+_IS_CODE = re.compile(r"[;{}<>#]")
 
 
 def _warn(found: List[Diagnostic]) -> None:
@@ -119,7 +126,7 @@ def _result(job: _core.Job, what: str) -> Any:
     finish(job, what)
     text = job.diagnostics
     if job.status == _INVALID_ARGUMENT:
-        raise ValueError(text.removeprefix("error: ").rstrip("\n"))
+        raise ValueError(_in_python(text.removeprefix("error: ").rstrip("\n")))
     if job.status == _OUT_OF_MEMORY:
         raise MemoryError("out of memory while compiling")
     if job.status:
@@ -130,12 +137,11 @@ def _result(job: _core.Job, what: str) -> Any:
 
 def _list_of(key: str, values: Iterable[Any]) -> List[Any]:
     if isinstance(values, str):
-        raise TypeError(f"{key}: expected a list, but got a string")
-    try:
+        raise TypeError(f"{_parameter(key)}: expected a list, but got a string")
+    if not isinstance(values, bytes) and isinstance(values, Iterable):
         return list(values)
-    except TypeError:
-        kind = type(values).__name__
-        raise TypeError(f"{key}: expected a list, but got {kind}") from None
+    kind = type(values).__name__
+    raise TypeError(f"{_parameter(key)}: expected a list, but got {kind}")
 
 
 def _is_unicode(text: str) -> bool:
@@ -158,7 +164,7 @@ class _Settings:
             return
         text = _text_of(value)
         if "\0" in text or not _is_unicode(text):
-            raise ValueError(f"option '{key}': expected a text, but got {text!r}")
+            raise ValueError(f"{_parameter(key)}: expected a text, but got {text!r}")
         self.found.append((key, text))
 
     def add_all(self, key: str, values: Iterable[object]) -> None:
@@ -168,7 +174,9 @@ class _Settings:
     def add_pairs(self, key: str, values: Optional[Mapping[str, object]]) -> None:
         if values is not None and not isinstance(values, Mapping):
             kind = type(values).__name__
-            raise TypeError(f"{key}: expected a mapping of names, but got {kind}")
+            raise TypeError(
+                f"{_parameter(key)}: expected a mapping of names, but got {kind}"
+            )
         for name, value in (values or {}).items():
             self.add(key, f"{name}={_text_of(value)}")
 
@@ -178,7 +186,7 @@ class _Settings:
             self.add_pairs("define", defines)
         else:
             self.add_all("define", defines)
-        folders = _list_of("include_dirs", include_dirs)
+        folders = _list_of("include-dir", include_dirs)
         self.add_all("include-dir", [os.fspath(folder) for folder in folders])
 
     def of(self, source: Source, name: Optional[str]) -> _Options:
@@ -191,6 +199,10 @@ class _Settings:
         is_text = isinstance(source, str) and "\n" in source
         if not is_text and "\0" in text:
             raise ValueError(f"expected a path, but got {text!r}")
+        if not is_text and _IS_CODE.search(text) and not os.path.exists(text):
+            raise ValueError(
+                f"expected a path, but got {text!r} (a text needs a line's end)"
+            )
         if not _is_unicode(text):
             raise ValueError("expected a text or a path of Unicode, but got surrogates")
         return _Options(text, is_text, name or "pipeline.piko.cpp", tuple(self.found))
@@ -394,6 +406,12 @@ def _read_options(
     settings.add("cache", None if cache else "off")
     settings.add("cache-dir", None if cache_dir is None else os.fspath(cache_dir))
     return settings.of(source, name)
+
+
+def _parameter(key: str) -> str:
+    """The argument of compile that a setting is of."""
+    names = [name for name, setting in _SETTINGS.items() if setting == key]
+    return names[0] if names else key
 
 
 def change_options(options: _Options, changed: Mapping[str, Any]) -> _Options:

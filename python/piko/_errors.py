@@ -6,7 +6,8 @@ from __future__ import annotations
 import enum
 import re
 from dataclasses import dataclass
-from typing import Any, List, Optional, Tuple
+from difflib import get_close_matches
+from typing import Any, Iterable, List, Optional, Tuple
 
 _LINE = re.compile(
     r"(?:(?P<file>[^\n]+?):(?P<line>\d+):(?P<column>\d+): )?"
@@ -119,6 +120,14 @@ class RunError(Error):
 
     def __reduce__(self) -> Tuple[Any, ...]:
         return RunError, (int(self.status), self.message)
+
+
+def say_unknown(name: str, names: Iterable[str]) -> str:
+    """Of an attribute that pipelines do not have, where they have those names."""
+    public = sorted({one for one in names if not one.startswith("_")})
+    near = get_close_matches(name, public)
+    text = f"a pipeline has no attribute '{name}'"
+    return f"{text}; near it are {', '.join(near)}" if near else text
 
 
 class CompileWarning(UserWarning):

@@ -8,16 +8,29 @@ import os
 import signal
 import threading
 import weakref
+from collections.abc import ItemsView, KeysView, ValuesView
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple, Union
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Tuple,
+    Union,
+    cast,
+)
 
 import numpy as np
 
 from . import _core
-from ._arrays import Bound, DeviceArray, assign, take_array, view_of
+from ._arrays import Bound, DeviceArray, assign, check_numbers, take_array, view_of
 from ._compile import Program, Source, compile
-from ._errors import RunError, Status
+from ._errors import RunError, Status, say_unknown
 from ._progress import Progress
 from ._records import DType, make_dtype
 from ._stats import Stats, read_stats
@@ -101,6 +114,8 @@ class Pipeline:
     * a buffer: the array that was assigned, which is used in place, or allocated;
     * an image: shape (..., height, width), without a copy, once the pipeline has run.
 
+    It is a mapping: `name in pipe`, len(pipe), list(pipe), keys, values, items.
+
     An array of an image, or of a buffer that the pipeline owns, keeps the pipeline
     alive and shows what each run leaves. What would move its memory (another domain,
     another number of primitives, `allocate`) raises BufferError while such an array is
@@ -117,8 +132,8 @@ class Pipeline:
         device: Optional[int] = None,
         **others: Any,
     ) -> None:
+        accepted = compile.__annotations__
         if not isinstance(program, Program):
-            accepted = compile.__annotations__
             options = {key: others.pop(key) for key in list(others) if key in accepted}
             program = compile(program, pipe, **options)
         elif pipe is not None and pipe != program.name:
@@ -131,6 +146,11 @@ class Pipeline:
         )
         self._check(self._core.status())
         self._read_declarations()
+        for name in others:
+            if name in accepted and name not in self._states:
+                raise TypeError(
+                    f"{name}: an option of piko.compile, but the program is compiled"
+                )
         if program._tuned_mappings:
             self._check(self._core.set_mappings(program._tuned_mappings))
         if program._tuned_strip_size:
@@ -167,6 +187,12 @@ class Pipeline:
         if status:
             raise RunError(status, self._core.message())
 
+    def _check_argument(self, who: str, status: int) -> None:
+        """Likewise, where an argument that is wrong is a ValueError."""
+        if status == Status.INVALID_ARGUMENT:
+            raise ValueError(f"{who}: {self._core.message()}")
+        self._check(status)
+
     def _use(self) -> None:
         """Before each call: one thread at a time, and in the process that made it."""
         user = self._user
@@ -191,6 +217,27 @@ class Pipeline:
                 f"pipeline '{self.name}' has no state '{name}'; it has {known}"
             )
         return state
+
+    if not TYPE_CHECKING:  # for whom any attribute could then be set
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """State and misspelled options do not become attributes unseen; those of
+            a class derived from this one may be what they like."""
+            known = name == "program" or name.startswith("_")
+            what = getattr(type(self), name, None)
+            if known or isinstance(what, property):
+                object.__setattr__(self, name, value)
+                return
+            if name in self.__dict__.get("_states", ()):
+                raise AttributeError(
+                    f"state is set by pipe['{name}'] = value, not as an attribute"
+                )
+            if type(self) is not Pipeline:
+                object.__setattr__(self, name, value)
+                return
+            if what is not None:
+                raise AttributeError(f"'{name}' is a method of pipelines")
+            raise AttributeError(say_unknown(name, [*dir(Pipeline), *self._states]))
 
     # --- What it is ---------------------------------------------------------
 
@@ -265,7 +312,7 @@ class Pipeline:
             kind = type(extent).__name__
             raise TypeError(f"domain: expected a cell count for each dimension, but got {kind}")
         cells = [_number("domain", cell) for cell in extent]
-        self._check(self._core.set_domain(cells))
+        self._check_argument("domain", self._core.set_domain(cells))
         self._domain = tuple(cells)
 
     @property
@@ -278,36 +325,38 @@ class Pipeline:
         self._use()
         number = _number("threads", count)
         if number >= 2**31:  # the runtime has no words for it
-            said = f"expected a number of threads in [0, 10000], but got {number}"
-            raise RunError(Status.INVALID_ARGUMENT, said)
-        self._check(self._core.set_threads(number))
+            raise ValueError(
+                f"threads: expected a number of threads in [0, 10000], but got {number}"
+            )
+        self._check_argument("threads", self._core.set_threads(number))
+
+    def _set(self, name: str, value: int) -> None:
+        self._use()
+        number = _number(name, value)
+        self._check_argument(name, getattr(self._core, name)(number))
 
     def set_memory_limit(self, bytes: int) -> None:
         """Limits all memory; 0 = no limit. A run that needs more is a RunError."""
-        self._use()
-        self._check(self._core.set_memory_limit(_number("set_memory_limit", bytes)))
+        self._set("set_memory_limit", bytes)
 
     def set_memory_budget(self, bytes: int) -> None:
         """How many bytes bins and queues should use; 0 = no budget. Sources run in
         strips where that helps."""
-        self._use()
-        self._check(self._core.set_memory_budget(_number("set_memory_budget", bytes)))
+        self._set("set_memory_budget", bytes)
 
     def set_strip_size(self, primitives: int) -> None:
         """How many primitives of a source a strip has; 0 = what fits."""
-        self._use()
-        self._check(self._core.set_strip_size(_number("set_strip_size", primitives)))
+        self._set("set_strip_size", primitives)
 
     def set_loop_limit(self, limit: int) -> None:
         """How many hops a primitive makes on a cycle of stages, and rounds it runs."""
-        self._use()
-        self._check(self._core.set_loop_limit(_number("set_loop_limit", limit)))
+        self._set("set_loop_limit", limit)
 
     def set_mappings(self, setting: str) -> None:
         """Which version of its loops run: measured, expected, vectors or scalar, or for
         one loop "Kernel:0=vectors"."""
         self._use()
-        self._check(self._core.set_mappings(setting))
+        self._check_argument("set_mappings", self._core.set_mappings(setting))
 
     def set_static_input(self, on: bool) -> None:
         """On a device: whether arrays of the host stay as they are between runs."""
@@ -323,6 +372,28 @@ class Pipeline:
         if state.bound is not None:
             return state.bound.array
         return self._view(state)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._states
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._states)
+
+    def __len__(self) -> int:
+        return len(self._states)
+
+    def __bool__(self) -> bool:
+        return True  # also without state
+
+    def keys(self) -> KeysView[str]:
+        """The names of state, as `list(pipe)`."""
+        return self._states.keys()
+
+    def values(self) -> ValuesView[Any]:
+        return ValuesView(cast(Mapping[str, Any], self))
+
+    def items(self) -> ItemsView[str, Any]:
+        return ItemsView(cast(Mapping[str, Any], self))
 
     def _read_constant(self, state: _State) -> Array:
         status, address, *_ = self._core.view(state.name)
@@ -360,6 +431,7 @@ class Pipeline:
 
     def _set_constant(self, state: _State, value: Any) -> None:
         array = self._read_constant(state).copy()
+        check_numbers(value, f"constant '{state.name}'")
         try:
             assign(array, value)
         except (ValueError, TypeError, OverflowError) as error:
@@ -394,12 +466,14 @@ class Pipeline:
             raise TypeError(f"'{name}' is {state.kind}, not a buffer")
         self._refuse_views(state, "allocated anew")
         status = self._core.allocate(name, _number("allocate", count))
-        error = RunError(status, self._core.message()) if status else None
+        said = self._core.message()
         # Without memory for the new records the old ones are gone, too.
-        if not error or not {one[0]: one[5] for one in self._core.states()}[name]:
+        if not status or not {one[0]: one[5] for one in self._core.states()}[name]:
             state.bound = None
-        if error:
-            raise error
+        if status == Status.INVALID_ARGUMENT:
+            raise ValueError(said)
+        if status:
+            raise RunError(status, said)
         return self._view(state)
 
     def feed(self, source: Union[str, int], primitives: Any) -> None:

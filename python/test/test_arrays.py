@@ -103,6 +103,18 @@ class Arrays(unittest.TestCase):
         ):
             with self.assertRaisesRegex(ValueError, "source 'add': .*" + text):
                 self.pipe.feed("add", value)
+        # A number for each record may have any shape, and so may rows of them.
+        volume = np.zeros((1, 3, 1), "f4")
+        self.pipe["sums"] = volume
+        self.assertIs(self.pipe["sums"], volume)
+        self.pipe.feed("add", self.points.reshape(3, 1, 4))
+        self.pipe.run()
+        self.assertEqual(volume.tolist(), [[[7], [16], [25]]])
+        with self.assertRaisesRegex(ValueError, "'sums': expected a contiguous array"):
+            self.pipe["sums"] = np.zeros((3, 4), "f4")[:, :2]
+        with self.assertRaisesRegex(ValueError, r"expected shape \(N,\), .* got \(\)"):
+            self.pipe["sums"] = np.array(1, "f4")
+        self.pipe["sums"] = self.sums
         self.pipe.feed("add", np.zeros((0, 4), "f4"))
         self.pipe.run()
         self.assertEqual(self.sums.tolist(), [0, 0, 0])

@@ -69,6 +69,37 @@ class Compare(unittest.TestCase):
         found = piko.compare(pipe, against="gpu-on-cpu")
         self.assertTrue(found, str(found))
         self.assertIn("stage 'store'", found.actual_error)
+        # The reference executor names the stage's class, and the pipeline.
+        found = piko.compare(pipe)
+        self.assertTrue(found, str(found))
+        said = "bin 0: expected an index into 'values' in [0, 1), but got 3"
+        self.assertEqual(
+            str(found),
+            "cpu against reference: both failed\n"
+            f"  reference: pipeline 'Outside': stage 'Store', {said}\n"
+            f"  cpu: stage 'store', {said}",
+        )
+        other = piko.Comparison("cpu", "reference", (), None, found.actual_error)
+        self.assertFalse(other)
+        self.assertEqual(
+            str(other),
+            "cpu against reference: different\n"
+            f"  reference: no error\n  cpu: stage 'store', {said}",
+        )
+        other = piko.Comparison("cpu", "reference", (), said, said.replace("3", "4"))
+        self.assertFalse(other)
+
+    def test_shapes(self):
+        """What was bound with another shape, or as plain numbers of records."""
+        pipe = make_pipe(opt_level=0)
+        pipe["tints"] = np.full((4, 5, 5, 3), 0.25, "f4")
+        pipe["weights"] = np.linspace(0, 1, 100, dtype="f4").reshape(4, 25)
+        self.assertTrue(piko.compare(pipe))
+        pipe = piko.Pipeline(ROOTS, domain=(1, 1), roots=np.zeros((8, 8, 2), "f4"))
+        pipe.feed("root", np.arange(64, dtype="f4").reshape(2, 4, 8))
+        (first,) = piko.compare(pipe).differences
+        self.assertEqual(len(first.index), 2)
+        self.assertLessEqual(first.count, 64)
 
 
 class Tune(unittest.TestCase):
