@@ -6,7 +6,10 @@
 #include "Core.h"
 
 #include <atomic>
+#include <cerrno>
 #include <csignal>
+
+#include <unistd.h>
 
 using namespace piko::python;
 
@@ -15,6 +18,19 @@ namespace {
 /// The run of the main thread that SIGINT ends, and what the signal did before.
 std::atomic<pikort_pipeline *> interruptible{nullptr};
 struct sigaction actionBefore;
+/// How often it came in that run.
+std::atomic<int> interruptCount{0};
+
+/// Who asks again wonders why nothing happens. Of what may be called here.
+void explainWaiting() {
+  static constexpr char text[] =
+      "\npiko: the run ends when its kernel has ended, and a kernel cannot be "
+      "stopped; Ctrl-\\ ends the process\n";
+  int before = errno;
+  [[maybe_unused]] ssize_t written =
+      write(STDERR_FILENO, text, sizeof text - 1);
+  errno = before;
+}
 
 void onInterrupt(int number, siginfo_t *info, void *context) {
   if (actionBefore.sa_flags & SA_SIGINFO)
@@ -22,14 +38,18 @@ void onInterrupt(int number, siginfo_t *info, void *context) {
   else if (actionBefore.sa_handler != SIG_IGN &&
            actionBefore.sa_handler != SIG_DFL)
     actionBefore.sa_handler(number); // Python notes it
-  if (pikort_pipeline *pipeline = interruptible.load())
+  if (pikort_pipeline *pipeline = interruptible.load()) {
     pikort_interrupt(pipeline, 1);
+    if (++interruptCount == 2)
+      explainWaiting();
+  }
 }
 
 /// While it lives, SIGINT also ends a pipeline's run.
 class InterruptScope {
 public:
   explicit InterruptScope(pikort_pipeline *pipeline) {
+    interruptCount = 0;
     interruptible = pipeline;
     struct sigaction action = {};
     action.sa_sigaction = onInterrupt;

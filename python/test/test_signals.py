@@ -51,6 +51,48 @@ pipe.run()
 print(heard, pipe["values"].tolist())
 """
 
+# A kernel that ends when it is told to. Once it runs, a thread is Ctrl-C: a signal that
+# is raised is handled before raise_signal returns.
+ENDLESS = r"""
+import piko, signal, sys, threading
+import numpy as np
+TEXT = '''
+#include <piko.h>
+struct Flags { piko::Buffer<int> flags; };
+struct Wait : piko::Stage<0, 0, 64, int>, piko::Uses<Flags> {
+  void schedule(piko::BinId) { specifyOrder(piko::Unordered); }
+  void process(const int &) {
+    piko::atomicAdd(state().flags[0], 1);
+    while (piko::atomicAddFetch(state().flags[1], 0) == 0) {}
+  }
+};
+struct Waiting : piko::Pipe<Flags> {
+  Wait wait;
+  Waiting() { source(wait); }
+};
+'''
+flags = np.zeros(2, "i4")
+pipe = piko.Pipeline(TEXT, domain=(1, 1), flags=flags, threads=1)
+pipe.feed("wait", [0])
+def ask():
+    while not flags[0]:
+        pass
+    for _ in range(int(sys.argv[1])):
+        signal.raise_signal(signal.SIGINT)
+    flags[1] = 1
+threading.Thread(target=ask).start()
+try:
+    pipe.run()
+except KeyboardInterrupt:
+    print("interrupted")
+pipe.run()
+print("end")
+"""
+CANNOT = (
+    "\npiko: the run ends when its kernel has ended, and a kernel cannot be stopped;"
+    " Ctrl-\\ ends the process\n"
+)
+
 
 class Interrupts(unittest.TestCase):
     def interrupt(self, code):
@@ -75,6 +117,12 @@ class Interrupts(unittest.TestCase):
     def test_run(self):
         self.assertEqual(self.interrupt(RUN), "interrupted\n[7]\n")
 
+    def test_endless_kernel(self):
+        """The second Ctrl-C is answered, once."""
+        for count, said in ((1, ""), (2, CANNOT), (3, CANNOT)):
+            done = run_python(ENDLESS, count)
+            self.assertEqual((done.stdout, done.stderr), ("interrupted\nend\n", said))
+
     def test_own_handler(self):
         done = run_python(HANDLED, DOTS)
         self.assertEqual((done.stdout, done.stderr), ("[2] [7]\n", ""))
@@ -94,7 +142,7 @@ WORKS = {
     "run": "make().run()",
     "compare": "piko.compare(make(), against='gpu-on-cpu')",
     "capture": "make().capture('/dev/null')",
-    "tune": "piko.tune(make(), space=['schedules'], budget=8)",
+    "tune": "piko.tune(make(), space=['schedules'], budget=64)",
     "chart": "piko.speed_error(make(), {'a': {}, 'b': {'threads': 1}}, rounds=1)",
 }
 PROGRESS = """
