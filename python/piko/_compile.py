@@ -110,15 +110,13 @@ _INVALID_ARGUMENT, _OUT_OF_MEMORY = 1, 3
 _IS_CODE = re.compile(r"[;{}<>#]")
 
 
-def _warn(found: List[Diagnostic]) -> None:
+def warn(warning: Warning) -> None:
     """As from the line of the user's that called this package."""
     level, frame = 1, sys._getframe()
     package = os.path.dirname(__file__)
     while frame.f_back and os.path.dirname(frame.f_code.co_filename) == package:
         level, frame = level + 1, frame.f_back
-    for one in found:
-        if one.severity == "warning":
-            warnings.warn(CompileWarning(one.text), stacklevel=level)
+    warnings.warn(warning, stacklevel=level)
 
 
 def _result(job: _core.Job, what: str) -> Any:
@@ -131,7 +129,9 @@ def _result(job: _core.Job, what: str) -> Any:
         raise MemoryError("out of memory while compiling")
     if job.status:
         raise CompileError(text)
-    _warn(parse_diagnostics(text))
+    for one in parse_diagnostics(text):
+        if one.severity == "warning":
+            warn(CompileWarning(one.text))
     return job.result()
 
 

@@ -70,7 +70,7 @@ class SourceInfo:
         return f"<piko.Source {self.index} '{self.name}', {self.count} bound>"
 
 
-def _number(what: str, value: Any) -> int:
+def read_number(what: str, value: Any) -> int:
     """An integer that fits into 64 bits."""
     try:
         number = operator.index(value)
@@ -276,7 +276,7 @@ class Pipeline:
                 raise KeyError(
                     f"stage '{which}' has several sources; say which: {numbers}"
                 )
-        elif 0 <= _number("source", which) < len(self._sources):
+        elif 0 <= read_number("source", which) < len(self._sources):
             return self._sources[which]
         names = ", ".join(one.name for one in self._sources)
         raise KeyError(
@@ -311,7 +311,7 @@ class Pipeline:
         if not isinstance(extent, Iterable):
             kind = type(extent).__name__
             raise TypeError(f"domain: expected a cell count for each dimension, but got {kind}")
-        cells = [_number("domain", cell) for cell in extent]
+        cells = [read_number("domain", cell) for cell in extent]
         self._check_argument("domain", self._core.set_domain(cells))
         self._domain = tuple(cells)
 
@@ -323,7 +323,7 @@ class Pipeline:
     @threads.setter
     def threads(self, count: int) -> None:
         self._use()
-        number = _number("threads", count)
+        number = read_number("threads", count)
         if number >= 2**31:  # the runtime has no words for it
             raise ValueError(
                 f"threads: expected a number of threads in [0, 10000], but got {number}"
@@ -332,7 +332,7 @@ class Pipeline:
 
     def _set(self, name: str, value: int) -> None:
         self._use()
-        number = _number(name, value)
+        number = read_number(name, value)
         self._check_argument(name, getattr(self._core, name)(number))
 
     def set_memory_limit(self, bytes: int) -> None:
@@ -465,7 +465,7 @@ class Pipeline:
         if state.kind != "buffer":
             raise TypeError(f"'{name}' is {state.kind}, not a buffer")
         self._refuse_views(state, "allocated anew")
-        status = self._core.allocate(name, _number("allocate", count))
+        status = self._core.allocate(name, read_number("allocate", count))
         said = self._core.message()
         # Without memory for the new records the old ones are gone, too.
         if not status or not {one[0]: one[5] for one in self._core.states()}[name]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -13,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
 
-from ._compile import Program, Source
+from ._compile import Program, Source, warn
 from ._errors import Error
-from ._pipeline import Pipeline
+from ._pipeline import Pipeline, read_number
 from ._progress import Progress
 
 # Of piko.compile's options those that piko-tune has, by its names.
@@ -26,6 +27,10 @@ _OPTIONS = {
     "cpu": "--cpu",
     "cache-dir": "--cache-dir",
 }
+# What it says of its options, where tune has such an argument.
+_OF_ARGUMENT = re.compile(
+    r"piko-tune: error: --(error|metric|budget|space|threads|clock): (.*)"
+)
 # The exit status of a program some library of which is missing.
 _NOT_LOADED = 127
 
@@ -38,12 +43,13 @@ class TuneError(Error):
         self.output = output
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tuned:
     """What piko-tune chose. `piko.compile(..., tuned=...)` takes it, and so do the files
     that `save` writes, for pikoc and piko-render, too.
 
-    `report` is what piko-tune says of how it found that, as docs/Tuning.md has it.
+    `report` is what piko-tune says of how it found that, as docs/Tuning.md has it; as a
+    text it is its summary, in a few lines.
     """
 
     pipeline: str
@@ -59,6 +65,14 @@ class Tuned:
 
     def save(self, path: Source) -> None:
         Path(path).write_text(self.text)
+
+    def __str__(self) -> str:
+        summary: str = self.report["summary"].rstrip("\n")
+        return re.sub(r"--budget (\d+)", r"budget=\1", summary)
+
+    def __repr__(self) -> str:
+        ms, text_ms = self.measured["ms"], self.measured["text_ms"]
+        return f"<piko.Tuned {self.report['chosen']}: {ms} ms, the text's {text_ms} ms>"
 
     def __fspath__(self) -> str:
         return self.path
@@ -106,12 +120,15 @@ def tune(
     whose results differ by at most `error` (a number, or "1/255") from what the text
     gives. Runs piko-tune on a capture, which takes as long as its frames: at most
     `budget`. `space` are groups as docs/Tuning.md has them; `metric` is max, mean, rms,
-    p99 or flip; `clock` wall or cpu. TuneError has what piko-tune wrote.
+    p99 or flip; `clock` wall or cpu. Warns where the budget is too small to try each
+    change of one value. TuneError has what piko-tune wrote.
     """
     if not isinstance(pipe, Pipeline):
         raise TypeError(f"expected a pipeline, but got {type(pipe).__name__}")
     if isinstance(space, str):
         raise TypeError("space: expected a list, but got a string")
+    frames = read_number("budget", budget)
+    count = pipe.threads if threads is None else read_number("threads", threads)
     program = pipe.program
     command = [os.fspath(tool) if tool is not None else _find_tool()]
     folder = tempfile.mkdtemp(prefix="piko-tune-")
@@ -125,25 +142,40 @@ def tune(
         out = os.path.join(folder, "tuned.json")
         command += [source, capture, "--pipe", program.name, "--json", "--out", out]
         command += ["--error", str(error), "--metric", metric]
-        command += ["--budget", str(budget), "--clock", clock]
-        command += ["--threads", str(pipe.threads if threads is None else threads)]
+        command += ["--budget", str(frames), "--clock", clock]
+        command += ["--threads", str(count)]
         command += _arguments(program)
         if space:
-            command += ["--space", ",".join(space)]
+            command += ["--space", ",".join(map(str, space))]
         with Progress(f"tuning {program.name}"):
             done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
             said = done.stderr.strip() or f"piko-tune ended with {done.returncode}"
+            wrong = _OF_ARGUMENT.fullmatch(said)
+            if wrong:
+                raise ValueError(f"{wrong[1]}: {wrong[2]}")
             if done.returncode == _NOT_LOADED:
                 said += " (on Debian, packages libmimalloc2.0 and libpng16-16)"
             raise TuneError(said, done.stderr)
         text = Path(out).read_text()
-        kept = _keep(text)
-        return _read(text, json.loads(done.stdout.splitlines()[-1]), kept)
+        tuned = _read(text, json.loads(done.stdout.splitlines()[-1]), _keep(text))
+        _warn_of_budget(tuned.report, frames)
+        return tuned
     except OSError as problem:
         raise TuneError(f"cannot run piko-tune, '{command[0]}': {problem.strerror}") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _warn_of_budget(report: Mapping[str, Any], budget: int) -> None:
+    missed = report["missed_changes"]
+    if missed:
+        warn(
+            UserWarning(
+                f"the budget of {budget} is too small for {missed} changes of one value;"
+                f" budget={report['needed_budget']} is enough"
+            )
+        )
 
 
 def _keep(text: str) -> str:

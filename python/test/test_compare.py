@@ -104,7 +104,7 @@ class Compare(unittest.TestCase):
 
 class Tune(unittest.TestCase):
     def make(self):
-        pipe = piko.Pipeline(ROOTS, domain=(1, 1), roots=np.zeros((4096, 2), "f4"))
+        pipe = piko.Pipeline(ROOTS, domain=(3, 2), roots=np.zeros((4096, 2), "f4"))
         pipe.feed("root", np.arange(4096, dtype="f4"))
         pipe.threads = 1
         return pipe
@@ -117,6 +117,18 @@ class Tune(unittest.TestCase):
         self.assertEqual((tuned.pipeline, tuned.tunables), ("Roots", {"steps": 4}))
         self.assertEqual(tuned.report["chosen"], "Roots steps=4")
         self.assertIn("ms", tuned.measured)
+        # Of a pipeline's own domain, which is no scene's.
+        size = (tuned.measured["width"], tuned.measured["height"])
+        self.assertEqual(size, (3, 2))
+        self.assertNotIn("lights", tuned.measured)
+        self.assertRegex(
+            repr(tuned), r"^<piko.Tuned Roots steps=4: [\d.]+ ms, the text's [\d.]+ ms>$"
+        )
+        self.assertRegex(
+            str(tuned),
+            r"^Roots steps=4: .* ms, .* times as fast as Roots \(.*\)\n"
+            r"error \(max\): .*, of 0.5\n(.*\n)*\d+ runs of 2 settings, .*$",
+        )
         program = piko.compile(ROOTS, tuned=tuned)
         self.assertEqual(
             program.code_hash, piko.compile(ROOTS, tunables={"steps": 4}).code_hash
@@ -126,10 +138,20 @@ class Tune(unittest.TestCase):
             again = piko.compile(ROOTS, tuned=os.path.join(folder, "tuned.json"))
             self.assertEqual(again.code_hash, program.code_hash)
 
+    def test_budget(self):
+        """Of what is not tried there is a warning, from the caller's line."""
+        with self.assertWarnsRegex(
+            UserWarning,
+            r"^the budget of 6 is too small for \d+ changes of one value; budget=\d+ is"
+            " enough$",
+        ) as caught:
+            tuned = piko.tune(self.make(), budget=6, space=["passes"], clock="cpu")
+        self.assertEqual(caught.filename, __file__)
+        needed = tuned.report["needed_budget"]
+        self.assertEqual(f"; budget={needed} is enough" in str(tuned), True)
+        self.assertNotIn("--", str(tuned))
+
     def test_errors(self):
-        with self.assertRaises(piko.TuneError) as caught:
-            piko.tune(self.make(), metric="none")
-        self.assertIn("expected max, mean, rms", str(caught.exception))
         with self.assertRaisesRegex(piko.TuneError, "cannot run piko-tune"):
             piko.tune(self.make(), tool="/nonexistent/piko-tune")
         with tempfile.TemporaryDirectory() as folder:

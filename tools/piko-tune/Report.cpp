@@ -91,9 +91,10 @@ static Json describeMeasurement(const TuneResult &result) {
   const Outcome &outcome = result.outcome;
   Json object = Json::object();
   object["scene"] = std::filesystem::path(render.scene).filename().string();
-  object["width"] = render.view.width;
-  object["height"] = render.view.height;
-  object["lights"] = render.lights;
+  object["width"] = result.size.x;
+  object["height"] = result.size.y;
+  if (!result.isCapture)
+    object["lights"] = render.lights;
   object["threads"] = render.threads;
   object["processor"] = getProcessorName();
   object["clock"] = result.options.countsCPU ? "cpu" : "wall";
@@ -123,6 +124,9 @@ std::string tune::writeJson(const TuneResult &result) {
   object["left_out"] = countLeftOut(result);
   object["budget_spent"] = int(outcome.isBudgetSpent);
   object["missed_changes"] = outcome.missedChanges;
+  if (outcome.missedChanges > 0)
+    object["needed_budget"] = outcome.neededBudget;
+  object["summary"] = summarize(result);
   if (const auto &survey = result.survey) {
     object["all_settings"] = survey->settings;
     object["all_programs"] = survey->programs;

@@ -14,6 +14,9 @@ namespace piko::tune {
 struct TuneResult {
   const TuneOptions &options;
   const Space &space;
+  /// Its size in pixels is a capture's own, whatever the options say.
+  glm::ivec2 size;
+  bool isCapture;
   const std::deque<Trial> &trials;
   Outcome outcome;
   std::optional<Survey> survey = {};

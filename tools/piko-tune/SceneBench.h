@@ -28,6 +28,7 @@ public:
   /// Which versions of loops are faster in a setting, as measured in the frames
   /// that it has run and, if that is not enough, a few more.
   render::Result<std::string> findMappings(const Setting &setting);
+  const render::SceneInput &getScene() const { return scene; }
 
 private:
   /// A pipeline with its scene; made when it first runs.

@@ -95,7 +95,13 @@ Result<Done> tuneScene(const TuneOptions &options) {
   auto outcome = runSearch(search, options);
   if (!outcome)
     return outcome.error();
-  TuneResult result{options, *space, search.getTrials(), *outcome};
+  const render::SceneInput &scene = (*bench)->getScene();
+  TuneResult result{options,
+                    *space,
+                    scene.size,
+                    scene.capture.has_value(),
+                    search.getTrials(),
+                    *outcome};
   if (options.exhaustive) {
     auto survey = surveyAll(space->dimensions, **bench, getLimit(options),
                             outcome->chosen->setting);
