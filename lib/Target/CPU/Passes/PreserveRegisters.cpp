@@ -22,15 +22,18 @@ static bool isFailure(const CallInst &call) {
 static Function *makePreserving(Function &callee, const Function &caller,
                                 const TargetMachine &machine) {
   Module &module = *callee.getParent();
+  Attribute processor = caller.getFnAttribute("target-cpu"),
+            features = caller.getFnAttribute("target-features");
+  std::string name = (callee.getName() + ".preserving").str();
+  if (processor.isValid())
+    name += ("." + processor.getValueAsString()).str();
   Function *function =
       Function::Create(callee.getFunctionType(), GlobalValue::InternalLinkage,
-                       callee.getName() + ".preserving", module);
+                       name, module);
   for (Attribute::AttrKind kind :
        {Attribute::Cold, Attribute::NoInline, Attribute::NoUnwind})
     function->addFnAttr(kind);
   function->addFnAttr("no_caller_saved_registers");
-  Attribute processor = caller.getFnAttribute("target-cpu"),
-            features = caller.getFnAttribute("target-features");
   if (processor.isValid())
     function->addFnAttr(processor);
   // What is restored must not be cleared before it returns.
