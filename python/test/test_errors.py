@@ -41,7 +41,7 @@ COMPILING = [
     ("piko.compile(TABLE, tunables={'factor': 4})", piko.CompileError,
      ".*: error: expected 3 or 5 for tunable 'factor', but got 4"),
     ("piko.compile(TABLE, tuned='none.json')", ValueError,
-     f"tuned: tuned file 'none.json': {NOTHING}"),
+     f"tuned: tuned file 'none.json': {NOTHING} in folder '.*'"),
     ("piko.compile(TABLE, without=['x'])", ValueError,
      "without: expected passes of .*, but got 'x'"),
     ("piko.compile(TABLE, without='x')", TypeError,
@@ -71,7 +71,8 @@ SETTING_UP = [
     ("piko.Pipeline(TABLE, domain=(1.5, 1))", TypeError,
      "domain: expected an integer, but got float"),
     ("piko.Pipeline(TABLE, domain=(-1, 1))", ValueError,
-     r"domain: expected domain extents in \[1, 1073741824\], but got -1"),
+     r"domain: pipeline 'Table': expected domain extents in \[1, 1073741824\], "
+     "but got -1 in dimension 0"),
     ("piko.Pipeline(TABLE, domain=(8, 8, 8))", ValueError,
      "domain: pipeline 'Table': expected a domain of rank 2, but got 3"),
     ("piko.Pipeline(TABLE, threads=1 << 40)", ValueError,

@@ -69,7 +69,7 @@ class Runs(unittest.TestCase):
         for threads in (-1, 1 << 40):
             with self.assertRaisesRegex(ValueError, r"threads: .* in \[0, 10000\]"):
                 pipe.threads = threads
-        with self.assertRaisesRegex(ValueError, "domain: expected domain extents in "):
+        with self.assertRaisesRegex(ValueError, "expected domain extents in "):
             pipe.domain = (0, 3)
         for value, error in (((1.5, 3), TypeError), ((1 << 70, 3), ValueError)):
             with self.assertRaisesRegex(error, "domain: expected an integer"):
