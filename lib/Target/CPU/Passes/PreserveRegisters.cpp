@@ -27,9 +27,8 @@ static Function *makePreserving(Function &callee, const Function &caller,
   std::string name = (callee.getName() + ".preserving").str();
   if (processor.isValid())
     name += ("." + processor.getValueAsString()).str();
-  Function *function =
-      Function::Create(callee.getFunctionType(), GlobalValue::InternalLinkage,
-                       name, module);
+  Function *function = Function::Create(
+      callee.getFunctionType(), GlobalValue::InternalLinkage, name, module);
   for (Attribute::AttrKind kind :
        {Attribute::Cold, Attribute::NoInline, Attribute::NoUnwind})
     function->addFnAttr(kind);
