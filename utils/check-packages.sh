@@ -44,7 +44,7 @@ open_root
 rm -rf "$root/checked"
 mkdir "$root/checked" "$root/checked/packages"
 cp "${packages[@]}" "$root/checked/packages"
-cp "$source"/utils/{check-tutorial,install-documents,document_links}.py "$root/checked"
+cp "$source"/utils/{check-tutorial,install-documents,document_links,tool}.py "$root/checked"
 readonly install='env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends'
 readonly doc=/usr/share/doc/piko
 
