@@ -65,6 +65,24 @@ void piko::setProbability(Operation *op, std::optional<double> probability) {
     op->removeAttr(marks::probability);
 }
 
+int64_t piko::countOperations(Region &region) {
+  int64_t count = 0;
+  for (Block &block : region)
+    for (Operation &op : block)
+      count += countOperations(&op);
+  return count;
+}
+
+int64_t piko::countOperations(Operation *op) {
+  constexpr double least = 1e-5;
+  int64_t count = 1;
+  auto branch = dyn_cast<scf::IfOp>(op);
+  for (Region &region : op->getRegions())
+    if (!branch || getProbability(branch, region).value_or(1) >= least)
+      count += countOperations(region);
+  return count;
+}
+
 //===----------------------------------------------------------------------===//
 // Bodies of loops
 //===----------------------------------------------------------------------===//

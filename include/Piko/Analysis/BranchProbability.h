@@ -25,6 +25,12 @@ std::optional<double> getIterationProbability(mlir::Operation *loop);
 /// time alike: a geometric distribution.
 std::optional<double> getProbableIterations(mlir::Operation *loop);
 
+/// How many operations an operation or a region holds, itself among them, but
+/// for what is known to run less often than once in 100,000 times: it takes no
+/// time, and is there twice where lanes vote.
+int64_t countOperations(mlir::Operation *op);
+int64_t countOperations(mlir::Region &region);
+
 /// Sets how probable it is that an scf.if takes its first side, or that a loop
 /// goes on; forgets it where that is not known.
 void setProbability(mlir::Operation *op, std::optional<double> probability);

@@ -13,7 +13,9 @@
 #include "Piko/Dialect/Piko/IR/CodeBuilder.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
+#include "mlir/IR/Dominance.h"
 #include "mlir/IR/IRMapping.h"
+#include "mlir/IR/PatternMatch.h"
 #include "mlir/Interfaces/LoopLikeInterface.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
 #include "mlir/Transforms/RegionUtils.h"
@@ -48,8 +50,9 @@ struct Group {
 /// Combines the tests of a block.
 class Combiner {
 public:
-  Combiner(Block &block, const llvm::DenseSet<StringAttr> &written, size_t most)
-      : block(block), written(written), most(most) {}
+  Combiner(Block &block, const llvm::DenseSet<StringAttr> &written,
+           DominanceInfo &dominance, size_t most)
+      : block(block), written(written), dominance(dominance), most(most) {}
 
   void run();
 
@@ -60,6 +63,7 @@ private:
 
   Block &block;
   const llvm::DenseSet<StringAttr> &written;
+  DominanceInfo &dominance;
   size_t most;
   SmallVector<Group> open, closed;
 };
@@ -133,47 +137,15 @@ static std::optional<Leaves> findLeaves(Value value) {
   return leaves;
 }
 
-/// Collects, in order, what a value is computed from in the block of `first`
-/// after it. Returns false if that cannot be computed before it.
-static bool findSlice(Value value, Operation *first,
-                      llvm::SetVector<Operation *> &slice) {
-  SmallVector<std::pair<Operation *, unsigned>> path; // with the next operand
-  auto enter = [&](Value next) {
-    Operation *op = next.getDefiningOp();
-    if (!op || op->getBlock() != first->getBlock() ||
-        op->isBeforeInBlock(first) || slice.contains(op))
-      return true;
-    if (op == first || op->getNumRegions() > 0 || !isPure(op))
-      return false;
-    path.push_back({op, 0});
-    return true;
-  };
-  if (!enter(value))
-    return false;
-  while (!path.empty()) {
-    auto &[op, operand] = path.back();
-    if (operand == op->getNumOperands()) {
-      slice.insert(op);
-      path.pop_back();
-    } else if (!enter(op->getOperand(operand++))) {
-      return false;
-    }
-  }
-  return true;
-}
-
 //===----------------------------------------------------------------------===//
 // Neighbours
 //===----------------------------------------------------------------------===//
 
 bool Combiner::join(Group &group, scf::IfOp test) {
-  Operation *first = group.tests.front();
-  llvm::SetVector<Operation *> slice;
-  for (Value input : getInputs(test))
-    if (!findSlice(input, first, slice))
-      return false;
-  for (Operation *op : slice)
-    op->moveBefore(first);
+  IRRewriter rewriter(test.getContext());
+  if (failed(moveValueDefinitions(rewriter, getInputs(test),
+                                  group.tests.front(), dominance)))
+    return false;
   test->moveAfter(group.tests.back());
   group.tests.push_back(test);
   return true;
@@ -307,6 +279,7 @@ void Combiner::run() {
 void CombineBoundsPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>()) {
     llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
+    DominanceInfo dominance(kernel);
     SmallVector<Block *> blocks;
     kernel.walk([&](Block *block) {
       auto around = dyn_cast<scf::IfOp>(block->getParentOp());
@@ -314,6 +287,6 @@ void CombineBoundsPass::runOnOperation() {
         blocks.push_back(block);
     });
     for (Block *block : blocks)
-      Combiner(*block, written, maxTests).run();
+      Combiner(*block, written, dominance, maxTests).run();
   }
 }

@@ -25,6 +25,7 @@
 #include "Vectorize/Cost/LaneLatency.h"
 #include "Vectorize/Shape/SequentialLoops.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "llvm/ADT/MapVector.h"
@@ -281,8 +282,7 @@ LaneCandidate::Refusal LaneCandidate::findRefusal(const IterationLanes &lanes,
 }
 
 double LaneCandidate::getShareOfWindow(bool isRefused) {
-  int64_t operations = 0;
-  loop.walk([&](Operation *) { ++operations; });
+  int64_t operations = countOperations(loop);
   // What is held in vain takes a compiler's time, vectors more than others: a
   // rasterizer's whole body, of 1,300 operations, half of what all took.
   double many = isRefused ? 400 : 1200;

@@ -2,6 +2,7 @@
 
 #include "Vectorize/Cost/BranchFrequency.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Vectorize/Analysis/IterationLanes.h"
 
 #include "mlir/Interfaces/LoopLikeInterface.h"
@@ -11,12 +12,6 @@ using namespace piko;
 
 /// Operations of a side that does next to nothing.
 static constexpr int64_t trivial = 16;
-
-static int64_t countOperations(Region &region) {
-  int64_t count = 0;
-  region.walk([&](Operation *) { ++count; });
-  return count;
-}
 
 bool piko::fails(Region &region) {
   return !region.empty() && llvm::any_of(region.front(), [](Operation &op) {
@@ -86,7 +81,7 @@ static bool goesOnAfter(Operation *op, Operation *loop) {
   for (; op != loop; op = op->getParentOp()) {
     int64_t after = 0;
     for (Operation *at = op->getNextNode(); at; at = at->getNextNode())
-      at->walk([&](Operation *) { ++after; });
+      after += countOperations(at);
     if (after > trivial)
       return true;
   }

@@ -14,8 +14,11 @@
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Vector/IR/VectorOps.h"
+#include "mlir/IR/Dominance.h"
 #include "mlir/IR/Matchers.h"
+#include "mlir/IR/PatternMatch.h"
 #include "mlir/Interfaces/SideEffectInterfaces.h"
+#include "mlir/Transforms/RegionUtils.h"
 #include "llvm/ADT/MapVector.h"
 #include "llvm/ADT/SetVector.h"
 
@@ -55,7 +58,7 @@ struct PairGathersPass : piko::impl::PairGathersBase<PairGathersPass> {
   void runOnOperation() override;
 
 private:
-  void load(ArrayRef<Candidate> candidates);
+  void load(ArrayRef<Candidate> candidates, DominanceInfo &dominance);
   void loadEach(const Candidate &candidate);
 };
 
@@ -171,34 +174,6 @@ static std::optional<Candidate> findCandidate(GatherOp gather) {
     index = words;
   scf::IfOp guard = findGuard(gather);
   return Candidate{gather, index, guard ? guard : gather.getOperation()};
-}
-
-/// Collects what a value is computed from after an operation of its block, if
-/// all of that may be computed before it.
-static bool findSlice(Value value, Operation *front,
-                      llvm::SetVector<Operation *> &slice) {
-  Operation *op = value.getDefiningOp();
-  if (!op || op->getBlock() != front->getBlock() ||
-      op->isBeforeInBlock(front) || slice.contains(op))
-    return value.getParentBlock() == front->getBlock() ||
-           value.getParentBlock()->getParentOp()->isAncestor(front);
-  if (op == front || op->getNumRegions() > 0 || !isPure(op) ||
-      llvm::any_of(op->getOperands(), [&](Value operand) {
-        return !findSlice(operand, front, slice);
-      }))
-    return false;
-  slice.insert(op);
-  return true;
-}
-
-static bool moveInFront(ArrayRef<Value> values, Operation *front) {
-  llvm::SetVector<Operation *> slice;
-  for (Value value : values)
-    if (!findSlice(value, front, slice))
-      return false;
-  for (Operation *op : slice)
-    op->moveBefore(front);
-  return true;
 }
 
 /// A value inside a guard is one of what stands in it, too.
@@ -328,14 +303,16 @@ static SmallVector<Value> createReads(CodeBuilder at, const Run &run) {
 }
 
 /// Whether gathers have become one, before an operation.
-static bool replace(const Run &run, Operation *front) {
+static bool replace(const Run &run, Operation *front,
+                    DominanceInfo &dominance) {
   SmallVector<Value> needed;
   for (const Candidate &read : run.reads) {
     leaveGuard(read);
     needed.append(
         {read.index, read.gather.getIndices().front(), read.gather.getMask()});
   }
-  if (!moveInFront(needed, front))
+  IRRewriter rewriter(front->getContext());
+  if (failed(moveValueDefinitions(rewriter, needed, front, dominance)))
     return false;
   OpBuilder builder(front);
   SmallVector<Value> values = createReads({builder, front->getLoc()}, run);
@@ -448,7 +425,8 @@ void PairGathersPass::loadEach(const Candidate &candidate) {
   gather.erase();
 }
 
-void PairGathersPass::load(ArrayRef<Candidate> candidates) {
+void PairGathersPass::load(ArrayRef<Candidate> candidates,
+                           DominanceInfo &dominance) {
   constexpr unsigned wordBits = 32;
   RunFinder finder(candidates);
   for (size_t i = 0; i < candidates.size(); ++i) {
@@ -458,7 +436,7 @@ void PairGathersPass::load(ArrayRef<Candidate> candidates) {
     SmallVector<size_t> found = finder.find(i, run.distance);
     for (size_t number : found)
       run.reads.push_back(candidates[number]);
-    if (found.size() > 1 && replace(run, candidates[i].whole)) {
+    if (found.size() > 1 && replace(run, candidates[i].whole, dominance)) {
       finder.take(found);
       continue;
     }
@@ -472,6 +450,7 @@ void PairGathersPass::load(ArrayRef<Candidate> candidates) {
 void PairGathersPass::runOnOperation() {
   for (auto kernel : getOperation().getOps<KernelOp>()) {
     unrollRuns(kernel);
+    DominanceInfo dominance(kernel);
     llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
     // In one block each, of one piece of state.
     llvm::MapVector<std::pair<Block *, Attribute>, SmallVector<Candidate>>
@@ -484,6 +463,6 @@ void PairGathersPass::runOnOperation() {
             *candidate);
     });
     for (auto &[place, candidates] : groups)
-      load(candidates);
+      load(candidates, dominance);
   }
 }

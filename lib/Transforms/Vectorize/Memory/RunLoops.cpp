@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Vectorize/Memory/RunLoops.h"
 
+#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -122,14 +123,13 @@ static bool isWorthUnrolling(scf::ForOp loop) {
   if (!first || !iterations || iterations->ugt(mostIterations) ||
       iterations->ult(2) || !matchPattern(loop.getStep(), m_One()))
     return false;
-  int64_t operations = 0;
   bool isInnermost = true;
   loop->walk([&](Operation *op) {
-    ++operations;
     isInnermost &= op == loop || !isa<scf::ForOp>(op);
   });
   return isInnermost &&
-         operations * int64_t(iterations->getZExtValue()) <= mostOperations &&
+         countOperations(loop) * int64_t(iterations->getZExtValue()) <=
+             mostOperations &&
          readsRun(loop, *first);
 }
 

@@ -71,12 +71,6 @@ static bool isUnderConditions(Operation *inner, Operation *outer) {
   return true;
 }
 
-static int64_t countOperations(Operation *loop) {
-  int64_t count = 0;
-  loop->walk([&](Operation *) { ++count; });
-  return count;
-}
-
 Operation *piko::findMergeable(Operation *outer,
                                llvm::function_ref<bool(Operation *)> mayPart) {
   Operation *found = nullptr;

@@ -276,44 +276,6 @@ def Piko_TakesVectorsOp : Piko_CPUOp<"takes_vectors", [
   let assemblyFormat = "$writer attr-dict";
 }
 
-def Piko_ElectOp : Piko_CPUOp<"elect", [NoMemoryEffect]> {
-  let summary = "which side of a condition the lanes of a vector take in a turn";
-  let description = [{
-    Iteration delaying, for loops that were merged into one. Of the lanes that are at
-    work, those with a true condition are on the first side. `side` is true if the
-    first one is taken, and is the same for all lanes: the second one is taken from
-    so many `eighths` of these lanes on, or if there are no others. `takes` is
-    whether a lane is on the side that is taken; others wait for a turn of theirs.
-    Where there are no lanes, an iteration is always on the side that is taken. It
-    depends on who is at work where it stands: nothing moves it.
-
-    ```mlir
-    %side, %takes = piko.cpu.elect %isInside second 3
-    ```
-  }];
-  let arguments = (ins I1:$condition, Piko_I64Attr:$eighths);
-  let results = (outs I1:$side, I1:$takes);
-  let assemblyFormat = "$condition `second` $eighths attr-dict";
-  let hasVerifier = 1;
-}
-
-def Piko_VoteOp : Piko_CPUOp<"vote", [Pure]> {
-  let summary = "whether a condition holds in all lanes that are at work";
-  let description = [{
-    The same for all lanes of a vector: true only if the condition holds in each that is
-    at work where it stands, and there is one. Where it is false, a lane may have a
-    condition that is true. So it chooses between two ways to the same result, of which
-    one is for all cases. Where there are no lanes, it is the condition.
-
-    ```mlir
-    %all = piko.cpu.vote %isInside
-    ```
-  }];
-  let arguments = (ins I1:$condition);
-  let results = (outs I1:$result);
-  let assemblyFormat = "$condition attr-dict";
-}
-
 def Piko_LocalBinOp : Piko_StorageOp<"local_bin", [
     SingleBlock, NoTerminator,
     DeclareOpInterfaceMethods<SymbolUserOpInterface>]> {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// Operations on the lanes of a vector: access to state and to primitives, and
-// permutations. piko-vectorize makes them. A part of PikoCPUOps.td, which
-// includes it.
+// Operations on the lanes of a vector: elections and votes, which piko-vectorize
+// writes as masks; access to state and to primitives, and permutations, which it
+// makes. A part of PikoCPUOps.td, which includes it.
 
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOLANEOPS_TD
 #define PIKO_DIALECT_PIKO_IR_PIKOLANEOPS_TD
@@ -12,6 +12,44 @@ def Piko_LaneMask : VectorOfRankAndType<[1], [I1]>;
 def Piko_LaneIndex
     : AnyTypeOf<[Index, VectorOfRankAndType<[1], [Index]>],
                 "index, or one for each lane">;
+
+def Piko_ElectOp : Piko_CPUOp<"elect", [NoMemoryEffect]> {
+  let summary = "which side of a condition the lanes of a vector take in a turn";
+  let description = [{
+    Iteration delaying, for loops that were merged into one. Of the lanes that are at
+    work, those with a true condition are on the first side. `side` is true if the
+    first one is taken, and is the same for all lanes: the second one is taken from
+    so many `eighths` of these lanes on, or if there are no others. `takes` is
+    whether a lane is on the side that is taken; others wait for a turn of theirs.
+    Where there are no lanes, an iteration is always on the side that is taken. It
+    depends on who is at work where it stands: nothing moves it.
+
+    ```mlir
+    %side, %takes = piko.cpu.elect %isInside second 3
+    ```
+  }];
+  let arguments = (ins I1:$condition, Piko_I64Attr:$eighths);
+  let results = (outs I1:$side, I1:$takes);
+  let assemblyFormat = "$condition `second` $eighths attr-dict";
+  let hasVerifier = 1;
+}
+
+def Piko_VoteOp : Piko_CPUOp<"vote", [Pure]> {
+  let summary = "whether a condition holds in all lanes that are at work";
+  let description = [{
+    The same for all lanes of a vector: true only if the condition holds in each that is
+    at work where it stands, and there is one. Where it is false, a lane may have a
+    condition that is true. So it chooses between two ways to the same result, of which
+    one is for all cases. Where there are no lanes, it is the condition.
+
+    ```mlir
+    %all = piko.cpu.vote %isInside
+    ```
+  }];
+  let arguments = (ins I1:$condition);
+  let results = (outs I1:$result);
+  let assemblyFormat = "$condition attr-dict";
+}
 
 class Piko_LaneAccessOp<string mnemonic, list<Trait> traits = []>
     : Piko_CPUOp<mnemonic, !listconcat(traits, [
