@@ -8,7 +8,6 @@
 #include "Passes/CompressStores.h"
 #include "Passes/LowerArithmetic.h"
 #include "Passes/LowerPermutations.h"
-#include "Passes/PreserveRegisters.h"
 #include "Passes/SelectBits.h"
 #include "Passes/SplitRows.h"
 #include "Passes/StoreLanes.h"
@@ -106,8 +105,6 @@ static ModulePassManager makeLastPasses(const TargetMachine &machine,
     passes.addPass(createModuleToFunctionPassAdaptor(StoreLanesPass(machine)));
     passes.addPass(
         createModuleToFunctionPassAdaptor(BroadcastLoadsPass(machine)));
-    if (sanitizer == Sanitizer::None)
-      passes.addPass(PreserveRegistersPass(machine));
   }
   if (sanitizer == Sanitizer::Thread)
     passes.addPass(createModuleToFunctionPassAdaptor(ThreadSanitizerPass()));

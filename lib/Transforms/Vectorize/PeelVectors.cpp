@@ -3,7 +3,6 @@
 // piko-peel-vectors: where masks cost, the last vector of a loop, which need
 // not be full, is peeled off. All vectors before it have no mask.
 
-#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Piko/Transforms/Passes.h"
@@ -45,14 +44,16 @@ static scf::ForOp getLoop(arith::CmpIOp mask, int64_t mostLanes) {
 /// code would be the greater cost.
 static bool pays(scf::ForOp loop) {
   constexpr int64_t most = 400;
+  int64_t operations = 0;
   bool hasRow = false;
   loop.walk([&](Operation *op) {
+    ++operations;
     auto gather = dyn_cast<GatherOp>(op);
     auto scatter = dyn_cast<ScatterOp>(op);
     hasRow |= (gather && gather.getConsecutive()) ||
               (scatter && scatter.getConsecutive());
   });
-  return hasRow && countOperations(loop) <= most;
+  return hasRow && operations <= most;
 }
 
 /// Where full vectors end: what is left then is less than one.

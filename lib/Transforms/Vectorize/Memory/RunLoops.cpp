@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Vectorize/Memory/RunLoops.h"
 
-#include "Piko/Analysis/BranchProbability.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -123,13 +122,14 @@ static bool isWorthUnrolling(scf::ForOp loop) {
   if (!first || !iterations || iterations->ugt(mostIterations) ||
       iterations->ult(2) || !matchPattern(loop.getStep(), m_One()))
     return false;
+  int64_t operations = 0;
   bool isInnermost = true;
   loop->walk([&](Operation *op) {
+    ++operations;
     isInnermost &= op == loop || !isa<scf::ForOp>(op);
   });
   return isInnermost &&
-         countOperations(loop) * int64_t(iterations->getZExtValue()) <=
-             mostOperations &&
+         operations * int64_t(iterations->getZExtValue()) <= mostOperations &&
          readsRun(loop, *first);
 }
 
