@@ -26,6 +26,7 @@
 #include "PikoToGPU/Mapping/SetupSplit.h"
 #include "PikoToGPU/PikoToGPU.h"
 
+#include "Piko/Analysis/IterationPixels.h"
 #include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 

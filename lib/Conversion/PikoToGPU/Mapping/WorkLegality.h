@@ -30,10 +30,6 @@ inline bool hasEffectsOfRegions(mlir::Operation *op) {
 /// threads can share the pixels of a bin.
 bool updatesPixelsAlone(KernelOp kernel);
 
-/// Whether no two iterations, or primitives, update a pixel: its coordinates
-/// say which iteration it is, or only one iteration does.
-bool updatesOwnPixels(mlir::Operation *loop);
-
 /// Whether the kernel around is in checking mode: what is wrong is reported in
 /// the order of the reference.
 bool isChecked(mlir::Operation *op);
