@@ -10,6 +10,8 @@ all passes and without each of those that --without takes. A pipeline is changed
 more than --least lines are, names of values aside: leaving a pass out leaves out the
 canonicalization after it, too. Of the examples and bodies that a pass changes most,
 --times are run with it and without it, in turn; a ratio above 1 is what the pass gains.
+For GPUs, --works are run by the driver for tests, and the warp instructions compared:
+examples by a small frame of piko-render, other texts by piko-compare's made-up input.
 
 Prints a table in Markdown, a pass a row; a text is a file. Ends with an error where a
 pass changes fewer than --fewest texts, unless --report.
@@ -19,6 +21,7 @@ import argparse
 import json
 import os
 import re
+import shlex
 import statistics
 import subprocess
 import sys
@@ -84,6 +87,9 @@ def parse_arguments():
                         help="that a pass pays on (%(default)s)")
     parser.add_argument("--times", type=int, default=3, metavar="PIPELINES",
                         help="that are run for each pass (%(default)s)")
+    parser.add_argument("--works", type=int, default=3, metavar="PIPELINES",
+                        help="whose work on a GPU is counted for each pass "
+                             "(%(default)s)")
     parser.add_argument("--rounds", type=int, default=5, help="(%(default)s)")
     parser.add_argument("--threads", type=int, default=os.cpu_count(),
                         help="of what is run (%(default)s)")
@@ -92,10 +98,10 @@ def parse_arguments():
     return parser.parse_args()
 
 
-def run(command):
+def run(command, environment=None):
     """What a command prints, or None where it fails."""
     done = subprocess.run([str(part) for part in command], capture_output=True,
-                          text=True)
+                          text=True, env=environment)
     return done.stdout if done.returncode == 0 else None
 
 
@@ -222,6 +228,60 @@ class Timer:
                 statistics.median(a for a, _ in pairs))
 
 
+class WorkCounter:
+    """Counts what a GPU has to do, by the driver for tests."""
+
+    def __init__(self, arguments, folder):
+        self.build, self.counts = arguments.build, Path(folder) / "counts.json"
+        self.environment = {
+            **os.environ,
+            "PIKO_CACHE_DIR": f"{folder}/cache",
+            "PIKO_CUDA_DRIVER": str(arguments.build / "lib/libpiko-test-driver.so"),
+            "PIKO_TEST_DRIVER_COUNTS": str(self.counts)}
+        self.known = {}  # by pipeline and pass
+
+    def get_command(self, pipeline):
+        text = pipeline.text
+        example = text.file.parent.name
+        if text.group == "examples" and example in kernels.PIPELINES:
+            scene = f"{ROOT}/{kernels.KNOT}" if example == "reyes" else BUNNY
+            return ["piko-render", text.file, *shlex.split(scene), "--pipe",
+                    pipeline.name, *kernels.PIPELINES[example][1], "--target", "cuda",
+                    "--width", 256, "--height", 192, "--frames", 1, "--warmup", 0]
+        return ["piko-compare", text.file, "--pipe", pipeline.name, "--target", "cuda",
+                "--runs", 1, "--threads", 1]
+
+    def count(self, pipeline, without=None):
+        """The warp instructions of all kernels; None where it does not run."""
+        if (pipeline, without) not in self.known:
+            tool, *rest = self.get_command(pipeline)
+            options = ["--without", without] if without else []
+            self.counts.unlink(missing_ok=True)
+            done = run([self.build / "bin" / tool, *rest, *options], self.environment)
+            counted = done is not None and self.counts.exists()
+            self.known[pipeline, without] = sum(
+                kernel["warpInstructions"]
+                for kernel in json.loads(self.counts.read_text())["kernels"].values()
+            ) if counted else None
+        return self.known[pipeline, without]
+
+
+def count_work(counter, pipelines, name, most):
+    """Of different texts that a pass changes most, the ratio of the work without it,
+    and the work."""
+    found, texts = [], set()
+    for pipeline in find_changed(pipelines, name, "gpu"):
+        if len(found) == most:
+            break
+        if pipeline.text.file in texts:
+            continue
+        texts.add(pipeline.text.file)
+        work, other = counter.count(pipeline), counter.count(pipeline, name)
+        if work and other:
+            found.append((pipeline, other / work, work))
+    return found
+
+
 def find_changed(pipelines, name, emission):
     return sorted((p for p in pipelines if (emission, name) in p.changed),
                   key=lambda p: -p.changed[emission, name] / p.lines[emission])
@@ -251,24 +311,27 @@ def main():
             read = pool.map(ablation.read, list_texts(arguments))
             pipelines = [pipeline for several in read for pipeline in several]
             pipelines = list(pool.map(ablation.compare, pipelines))
-        timer = Timer(arguments, folder)
-        rows = [(name, measure(timer, pipelines, name, arguments.times))
+        timer, counter = Timer(arguments, folder), WorkCounter(arguments, folder)
+        rows = [(name, measure(timer, pipelines, name, arguments.times),
+                 count_work(counter, pipelines, name, arguments.works))
                 for name in ablation.passes]
     print(f"{len(pipelines)} pipelines of {count_texts(pipelines)} texts.\n")
     groups = list(dict.fromkeys(p.text.group for p in pipelines))
     heads = ["pass", "CPU", "GPU", "texts", *(f"of {g}" for g in groups),
-             "without it, a frame takes"]
+             "without it, a frame takes", "and a GPU's warps do"]
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     few = []
-    for name, times in rows:
+    for name, times, works in rows:
         changed = {e: find_changed(pipelines, name, e) for e in EMISSIONS}
         either = {*changed["target"], *changed["gpu"]}
         if count_texts(either) < arguments.fewest:
             few.append(name)
         said = "; ".join(f"{p.label()} {ratio:.2f} of {ms:.3g} ms"
                          for p, ratio, ms in times)
+        counted = "; ".join(f"{p.label()} {ratio:.2f} of {work / 1e6:.3g} million"
+                            for p, ratio, work in works)
         cells = [name, *(len(changed[e]) for e in EMISSIONS), count_texts(either),
-                 *(count_texts(either, group) for group in groups), said]
+                 *(count_texts(either, group) for group in groups), said, counted]
         print("| " + " | ".join(map(str, cells)) + " |")
     if few and not arguments.report:
         sys.exit("ablate: expected each pass to change "
