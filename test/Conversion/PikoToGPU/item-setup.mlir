@@ -60,3 +60,60 @@ piko.pipeline @P rank 2 {
     }
   }
 }
+
+// What an array holds is left to the pixels, and so is a branch whose other way hands
+// that on: the setup has the branch for the quotient alone.
+// CHECK-LABEL: piko.kernel @kernel_pick
+// CHECK:         gpu.launch {{.*}} %[[SHORT:[a-z0-9]+]] : memref<192xi32, #gpu.address_space<workgroup>>
+// CHECK:             %[[QUOTIENT:.*]] = arith.divsi
+// CHECK:             memref.store %[[QUOTIENT]], %[[SHORT]]
+// CHECK-NEXT:      }
+// CHECK:           gpu.barrier
+// CHECK:           scf.for %{{.*}} = %c0_i32
+// CHECK:             %[[KEPT:.*]] = memref.load %{{.*}} : memref<4xi32>
+// CHECK:             %[[PICKED:.*]] = scf.if
+// CHECK:               %[[LOADED:.*]] = memref.load %[[SHORT]]
+// CHECK-NEXT:          scf.yield %[[LOADED]]
+// CHECK-NEXT:        } else {
+// CHECK-NEXT:          scf.yield %[[KEPT]]
+// CHECK:             arith.extsi %[[PICKED]]
+piko.pipeline @Arrays rank 2 {
+  piko.image @image : @Pixel rank 2
+  piko.source @pick
+  piko.stage @pick bins [64, 64] threads 64 : @Plane -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@Plane>):
+      %x = piko.get %f "x" : !piko.prim<@Plane> -> i32
+      %y = piko.get %f "y" : !piko.prim<@Plane> -> i32
+      %b = piko.bin_at %x, %y : i32, i32
+      piko.assign_to %b
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@Plane>):
+      %x = piko.get %f "x" : !piko.prim<@Plane> -> i32
+      %y = piko.get %f "y" : !piko.prim<@Plane> -> i32
+      %to_x = piko.get %f "toX" : !piko.prim<@Plane> -> i32
+      %array = memref.alloca() : memref<4xi32>
+      %three = arith.constant 3 : i32
+      %last = arith.andi %x, %three : i32
+      %at = arith.index_castui %last : i32 to index
+      memref.store %y, %array[%at] : memref<4xi32>
+      %kept = memref.load %array[%at] : memref<4xi32>
+      %is_right = arith.cmpi slt, %x, %to_x : i32
+      %picked = scf.if %is_right -> (i32) {
+        %quotient = arith.divsi %to_x, %three : i32
+        scf.yield %quotient : i32
+      } else {
+        scf.yield %kept : i32
+      }
+      %wide = arith.extsi %picked : i32 to i64
+      piko.update @image[%x, %y : i32, i32] {
+      ^bb0(%old: i64):
+        %new = arith.addi %old, %wide : i64
+        piko.yield [%new : i64]
+      }
+      piko.return
+    }
+  }
+}

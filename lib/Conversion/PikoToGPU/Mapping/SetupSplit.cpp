@@ -26,6 +26,15 @@ SetupSplit::SetupSplit(Operation *items, Extent extent, ArrayRef<Value> own,
 // What is left to the pixels
 //===----------------------------------------------------------------------===//
 
+/// Whether an operand is left to the pixels.
+bool SetupSplit::needsPixels(Operation *op) const {
+  return llvm::any_of(op->getOperands(), [&](Value operand) {
+    Operation *from = operand.getDefiningOp();
+    return isa<MemRefType>(operand.getType()) || own.contains(operand) ||
+           (from && pixels.contains(from));
+  });
+}
+
 bool SetupSplit::mustKeep(Operation *op) const {
   if (extent == Extent::Fields && !isa<GetOp, ItemOp>(op))
     return true;
@@ -35,11 +44,7 @@ bool SetupSplit::mustKeep(Operation *op) const {
   if (!hasEffectsOfRegions(op) && !isMemoryEffectFree(op) &&
       !hasSingleEffect<MemoryEffects::Read>(op))
     return true;
-  return llvm::any_of(op->getOperands(), [&](Value operand) {
-    Operation *from = operand.getDefiningOp();
-    return isa<MemRefType>(operand.getType()) || own.contains(operand) ||
-           (from && pixels.contains(from));
-  });
+  return needsPixels(op);
 }
 
 /// Whether all threads take the same way through an scf.if that has work for
@@ -75,12 +80,18 @@ void SetupSplit::findPixelWork() {
   for (bool changed = true; changed;) {
     changed = false;
     walk([&](Operation *op) {
-      if (op->hasTrait<OpTrait::IsTerminator>() || pixels.contains(op))
-        return;
       Operation *parent = op->getParentOp();
       bool isInLoop =
           parent != items && pixels.contains(parent) && !isCommonIf(parent);
-      if (!mustKeep(op) && !isInLoop && !hasWorkForPixels(op))
+      bool isLeft;
+      if (op->hasTrait<OpTrait::IsTerminator>()) {
+        // What it hands on is a result of the operation around it.
+        isLeft = parent != items && needsPixels(op);
+        op = parent;
+      } else {
+        isLeft = mustKeep(op) || isInLoop || hasWorkForPixels(op);
+      }
+      if (!isLeft || pixels.contains(op))
         return;
       changed = true;
       pixels.insert(op);

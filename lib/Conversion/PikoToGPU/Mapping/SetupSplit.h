@@ -40,6 +40,7 @@ public:
 
 private:
   void findPixelWork();
+  bool needsPixels(mlir::Operation *op) const;
   bool hasWorkForPixels(mlir::Operation *op) const;
   bool isCommonIf(mlir::Operation *op) const;
   void findShared();
