@@ -31,8 +31,11 @@
 #include <utility>
 
 static constexpr int64_t warpSize = 32;
-/// Only what is touched takes memory.
-static constexpr size_t stackSize = size_t(64) << 20;
+/// Only what is touched takes memory. No power of two: else the frames of all
+/// threads, and what maps their pages, would be in the same few sets of the
+/// caches.
+static constexpr size_t stackSize =
+    (size_t(64) << 20) + (size_t(32) << 10) + 832;
 
 namespace {
 
