@@ -59,14 +59,18 @@ def runner_of(args, passes, first, **options):
         target = ["--cpu", args.cpu]
     if args.runner:
         target += ["--runner", args.runner]
-    return Runner(args.tool, args.mlir, passes, strip=args.strip, target=target, **options)
+    # A GPU takes no number of threads; its second frame is the first one's graph again.
+    threads = (1, 2) if args.gpu else (1, 2, 7)
+    return Runner(args.tool, args.mlir, passes, threads, strip=args.strip, target=target,
+                  **options)
 
 
 def run_batch(args, first, count):
     features = features_of(args)
     pipes = [pipelines.generate(first + i, features, f"P{i}") for i in range(count)]
     passes = passes_of(args, first)
-    verdicts = runner_of(args, passes, first, keep=args.keep).run(pipes)
+    verdicts = runner_of(args, passes, first, timeout=args.timeout,
+                         keep=args.keep).run(pipes)
     used = Counter(f"without-{p}" for p in passes for _ in pipes)
     for pipe in pipes:
         used.update(pipe.used)
@@ -168,6 +172,9 @@ def main():
                         help="runs code for --cpu aarch64: see piko-compare")
     parser.add_argument("--strip", type=int, default=0,
                         help="primitives of a source in a strip (all)")
+    parser.add_argument("--timeout", type=int, default=120, metavar="SECONDS",
+                        help="what a pipeline may take (120), which is short where "
+                             "others use the processors")
     parser.add_argument("--keep", metavar="FOLDER",
                         help="leave files there, where another run finds in the cache "
                              "what it has in common with this one")
