@@ -52,17 +52,19 @@ struct Thread {
   bool condition = false; ///< That it brings to a Barrier.
 };
 
-/// Stacks of threads, kept from block to block.
+/// Stacks of threads, kept from launch to launch: pages that are new cost more than
+/// a short kernel does.
 class Stacks {
 public:
   Stacks() = default;
   Stacks(const Stacks &) = delete;
   Stacks &operator=(const Stacks &) = delete;
-  ~Stacks() {
-    if (memory)
-      munmap(memory, count * stackSize);
-  }
+  ~Stacks() { release(); }
+  /// For at least so many; false if there is no room.
   bool reserve(size_t threads) {
+    if (threads <= count)
+      return true;
+    release();
     void *mapped = mmap(nullptr, threads * stackSize, PROT_READ | PROT_WRITE,
                         MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (mapped == MAP_FAILED)
@@ -76,6 +78,13 @@ public:
   }
 
 private:
+  void release() {
+    if (memory)
+      munmap(memory, count * stackSize);
+    memory = nullptr;
+    count = 0;
+  }
+
   void *memory = nullptr;
   size_t count = 0;
 };
@@ -83,11 +92,10 @@ private:
 class EmulatedDevice {
 public:
   EmulatedDevice(void (*code)(const void *), const void *arguments,
-                 int64_t blocks, int64_t threads)
+                 int64_t blocks, int64_t threads, Stacks &stacks)
       : threads(static_cast<size_t>(threads)), blocks(blocks), code(code),
-        arguments(arguments) {}
+        arguments(arguments), stacks(stacks) {}
 
-  bool reserve() { return stacks.reserve(threads.size()); }
   /// What is wrong; empty if nothing.
   std::string runBlock(int64_t number);
   /// Lets others run until the current thread can go on.
@@ -110,7 +118,7 @@ private:
   void (*code)(const void *);
   const void *arguments;
   jmp_buf scheduler;
-  Stacks stacks;
+  Stacks &stacks;
 };
 
 thread_local EmulatedDevice *device = nullptr;
@@ -283,9 +291,10 @@ void pikoir_grid_launch(pikort_pipeline *p, void (*thread)(const void *),
   if (p->status != PIKORT_OK)
     return;
   static std::mutex mutex; // the memory of blocks is the code's
+  static Stacks stacks;
   std::lock_guard<std::mutex> lock(mutex);
-  EmulatedDevice grid(thread, arguments, blocks, threads);
-  if (!grid.reserve()) {
+  EmulatedDevice grid(thread, arguments, blocks, threads, stacks);
+  if (!stacks.reserve(static_cast<size_t>(threads))) {
     pikoir_fail_text(p, PIKORT_OUT_OF_MEMORY, "no room for a block's threads");
     return;
   }
