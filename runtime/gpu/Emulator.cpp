@@ -52,8 +52,8 @@ struct Thread {
   bool condition = false; ///< That it brings to a Barrier.
 };
 
-/// Stacks of threads, kept from launch to launch: pages that are new cost more than
-/// a short kernel does.
+/// Stacks of threads, kept from launch to launch: pages that are new cost more
+/// than a short kernel does.
 class Stacks {
 public:
   Stacks() = default;
