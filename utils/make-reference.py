@@ -54,6 +54,7 @@ LEVELS = [
      "Transforms/SpecializationPasses.td"),
     ("Authored level", "stages and their phases", "Transforms/AuthoredPasses.td"),
     ("Kernels level", "phases that run together", "Transforms/KernelPasses.td"),
+    ("Ranks", "a run in several processes", "Transforms/RankPasses.td"),
     ("Machine level", "structured work on bins", "Transforms/MachinePasses.td"),
     ("Loops for processors", "loops over what is stored",
      "Transforms/CPUPasses.td"),

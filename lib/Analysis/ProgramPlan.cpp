@@ -12,9 +12,9 @@
 using namespace mlir;
 using namespace piko;
 
-ProgramPlan::ProgramPlan(PipelineOp pipeline)
+ProgramPlan::ProgramPlan(PipelineOp pipeline, RankedEdges ranked)
     : graph(pipeline, getDeclaredStages(pipeline)), components(graph),
-      loops(graph.cutAtCollectors()), reach(graph.reach()) {
+      loops(graph.cutAtCollectors()), ranked(ranked), reach(graph.reach()) {
   order = components.declarationOrder();
   for (StageOp stage : graph.stages)
     ordered.push_back(!isOrderIrrelevant(pipeline, stage));
@@ -76,6 +76,16 @@ int64_t &ProgramPlan::widthAt(int stage) {
   return isLoop(loop) ? loopKeys[loop] : keeps[stage];
 }
 
+bool ProgramPlan::isDivided(int stage) const {
+  return ranked.divided && ranked.divided->contains(graph.getStage(stage));
+}
+
+bool ProgramPlan::mergesRanks(const PlannedEdge &edge) const {
+  return ranked.exchanged && ranked.exchanged->contains(edge.op) &&
+         (ordered[edge.consumer] || isLoop(getLoop(edge.consumer)) ||
+          graph.getStage(edge.consumer).getTakesList());
+}
+
 /// Keys are needed where several edges or sources come into a stage, or into a
 /// loop, and on the way there: what goes into a stage, or into a loop, needs
 /// keys if what comes out does, unless that starts a new lineage.
@@ -89,7 +99,8 @@ void ProgramPlan::findKeyed() {
     changed = false;
     for (PlannedEdge &edge : edges) {
       if (edge.keys > 0 || isInsideLoop(edge) ||
-          (widthAt(edge.consumer) == 0 && !merges(edge.consumer)))
+          (widthAt(edge.consumer) == 0 && !merges(edge.consumer) &&
+           !mergesRanks(edge)))
         continue;
       edge.keys = 1;
       changed = true;
@@ -100,7 +111,8 @@ void ProgramPlan::findKeyed() {
 }
 
 /// A word for a source's primitives, two for what a stage that collects emits,
-/// one more for each hop; a loop counts as one hop.
+/// three if ranks share it, one more for each hop; a loop counts as one
+/// hop.
 void ProgramPlan::findWidths() {
   for (bool changed = true; changed;) {
     changed = false;
@@ -109,7 +121,7 @@ void ProgramPlan::findWidths() {
         continue;
       int64_t width = edge.producer < 0 ? 1
                       : graph.getStage(edge.producer).collects()
-                          ? 2
+                          ? (isDivided(edge.producer) ? 3 : 2)
                           : widthAt(edge.producer) + 1;
       int64_t &kept = widthAt(edge.consumer);
       changed |= width > edge.keys || (kept > 0 && width > kept);

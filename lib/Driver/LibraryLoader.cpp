@@ -48,6 +48,8 @@ static std::string findMeaningless(const LoadOptions &options) {
   const SynthesisOptions &synthesis = options.synthesis;
   if (options.check.enabled || synthesis.count != Counting::None)
     return "checks and counters are compiled into";
+  if (synthesis.ranks)
+    return "exchanges between ranks are compiled into";
   if (!synthesis.without.empty() || !synthesis.fix.empty() ||
       !synthesis.directives.empty())
     return "passes, constants and directives are of";

@@ -38,7 +38,8 @@ std::string piko::makeObjectRequest(const ObjectOptions &options,
         options.target.optLevel, int(options.target.sanitizer),
         int(options.remarks), int(source.gpu.target),
         int(source.synthesis.count), int(100 * source.synthesis.mappingWindow),
-        int(source.gpu.seed), int(source.gpu.blocks), int(source.gpu.threads)})
+        int(source.synthesis.ranks), int(source.gpu.seed),
+        int(source.gpu.blocks), int(source.gpu.threads)})
     key.add(std::to_string(number));
   key.add(options.target.arch)
       .add(source.gpu.chip)

@@ -19,6 +19,8 @@ struct pikort_pipeline;
 
 namespace piko::rt {
 
+struct KernelError;
+
 class Executor {
 public:
   virtual ~Executor() = default;
@@ -51,6 +53,8 @@ public:
   virtual bool reportsInOrder() const = 0;
   /// The first error of the run was found now.
   virtual void noteError() = 0;
+  /// Where the unit of an error is in an order that all ranks know.
+  virtual int64_t placeOf(const KernelError &) const { return 0; }
   /// The message of an error whose text is `plain`, with all that is known of
   /// where it was found.
   virtual std::string describe(int32_t code,

@@ -2,6 +2,8 @@
 //===- Host.cpp - The host API: life and options --------------------------===//
 
 #include "common/HostCalls.h"
+#include "ranks/Ranks.h"
+#include "ranks/Siblings.h"
 
 #include <algorithm>
 
@@ -50,6 +52,7 @@ static pikort_pipeline *create(const pikort_program &program,
                                             ": expected a program with setup "
                                             "and run"};
     p->runProgram = program.run;
+    p->program = program;
     program.setup(p);
     if (p->status != PIKORT_OK)
       return; // setup noted why

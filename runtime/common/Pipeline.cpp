@@ -288,6 +288,7 @@ int32_t pikort_pipeline::fail(int32_t code, const std::string &text) noexcept {
   int32_t none = 0;
   if (!status.compare_exchange_strong(none, code))
     return code;
+  errorPlace = {.kernel = runningKernel};
   try {
     message = text.empty() ? std::string("out of memory") : text;
   } catch (...) {
@@ -431,6 +432,16 @@ void pikort_pipeline::settleReported() noexcept {
           error, rank, hasState ? &states[error.state] : nullptr,
           describeBin(stage, error.bin, domain, rank), memoryLimitText(*this));
       fail(error.code, executor->describe(error.code, text));
+      errorPlace = {runningKernel,
+                    error.depth,
+                    ranks ? executor->placeOf(error) : error.unit,
+                    error.stage,
+                    error.bin,
+                    error.state,
+                    error.a,
+                    error.b};
+      errorName = error.name;
+      errorBarrier = error.barrier;
     } catch (...) {
       fail(error.code, {});
     }
@@ -443,4 +454,6 @@ void pikort_pipeline::clearStatus() noexcept {
   reported = 0;
   status = 0;
   message.clear();
+  errorName.clear();
+  errorBarrier.clear();
 }

@@ -93,6 +93,7 @@ struct Edge {
   bool insideLoop = false;   ///< Both ends are in one loop.
   bool leavesStrips = false; ///< Only the producer is in a group of strips.
   bool local = false;        ///< The consumer runs in the producer's kernel.
+  bool exchanged = false;    ///< Between ranks, if there are several.
   bool keyed() const { return keyWidth > 0; }
 };
 
@@ -185,8 +186,10 @@ struct Stage {
   int64_t tileSize = 0;
   BinSchedule schedule; ///< Of all bins.
   std::array<int64_t, 4> binSize{};
-  int32_t root = 0;     ///< Of the lineage that it starts.
-  int32_t keyWidth = 0; ///< 64-bit words of its items' keys, 0 = none.
+  int32_t root = 0;        ///< Of the lineage that it starts.
+  int32_t keyWidth = 0;    ///< 64-bit words of its items' keys, 0 = none.
+  int32_t partition = 0;   ///< Which ranks run it: a pikoir_partition.
+  int32_t launchOrder = 0; ///< Of programs for ranks: when its kernel runs.
   std::vector<Reduction> reductions; ///< Of its kernel, by private copy.
   std::vector<Selection> selections; ///< Of its kernel.
   // Completed by finish():
@@ -281,6 +284,16 @@ struct KernelError {
   std::string_view barrier = {};
 };
 
+/// Where a run has failed, in the order of the sequential program: the kernel,
+/// and what report() compares.
+struct ErrorPlace {
+  int64_t kernel = 0, depth = 0, unit = -1, stage = 0, bin = 0, state = 0,
+          a = 0, b = 0;
+};
+
+class Ranks;    // Ranks.h
+class Siblings; // Siblings.h
+
 } // namespace piko::rt
 
 struct pikort_pipeline {
@@ -335,6 +348,16 @@ struct pikort_pipeline {
   std::atomic<int32_t> status{0};
   std::atomic<int32_t> reported{0};     ///< Some error that report() noted.
   std::atomic<bool> interrupted{false}; ///< No kernel shall begin.
+
+  // Of a program for ranks:
+  int32_t partitionedStages = 0;
+  std::unique_ptr<piko::rt::Ranks> ranks; ///< None: a process of its own.
+  pikort_program program{};               ///< That made it, but for its name.
+  int32_t threadRanks = 0;                ///< In this process; 0 = not said.
+  std::unique_ptr<piko::rt::Siblings> siblings; ///< These, but for the first.
+  int32_t runningKernel = 0; ///< Launch order of the kernel that began last.
+  piko::rt::ErrorPlace errorPlace;
+  std::string errorName, errorBarrier;
 
   // Of a run that the host has not waited for:
   bool pending = false;

@@ -2,6 +2,7 @@
 //===- Reflect.cpp - The host API: descriptions and statistics ------------===//
 
 #include "common/Pipeline.h"
+#include "ranks/Ranks.h"
 
 using namespace piko::rt;
 
@@ -212,6 +213,8 @@ void pikort_reset_stats(pikort_pipeline *p) {
     stats = {};
   for (std::unique_ptr<Counter> &counter : p->counters)
     counter->reset();
+  if (p->ranks)
+    p->ranks->traffic.clear();
   p->runs = 0;
   p->memory.resetPeak();
 }

@@ -9,6 +9,8 @@
 
 #include "common/CallStack.h"
 #include "common/HostCalls.h"
+#include "ranks/Ranks.h"
+#include "ranks/Siblings.h"
 
 #include <cmath>
 #include <cstdio>
@@ -172,11 +174,13 @@ static void guardedWithStack(pikort_pipeline &p, Body body) {
 
 /// The thread's part of a run, or all of it; throws.
 static void begin(pikort_pipeline &p, void *stream, bool waits) {
+  p.runningKernel = 0;
   checkAlive(p);
   checkBound(p);
   checkFixed(p);
   checkApart(p);
-  captureAsAsked(p);
+  if (!p.ranks || p.ranks->rank() == 0)
+    captureAsAsked(p);
   p.computeGrids();
   p.threads = p.executor->availableThreads(p.wantedThreads);
   if (p.accelerator)
@@ -199,6 +203,8 @@ static void begin(pikort_pipeline &p, void *stream, bool waits) {
 }
 
 static int32_t end(pikort_pipeline &p) {
+  if (p.ranks)
+    p.ranks->finish();
   p.executor->endRun();
   for (Stage &stage : p.stages)
     stage.binSchedules = {};
@@ -249,10 +255,20 @@ static int32_t run(pikort_pipeline *p, void *stream, bool waits) {
   CallScope scope;
   if (int32_t code = call(p, [&] { finishRunBefore(*p); }))
     return code;
+  if (int32_t code = call(p, [&] {
+        prepareSiblings(*p);
+        if (p->siblings)
+          p->siblings->begin();
+      }))
+    return code;
   p->profile.begin();
   guardedWithStack(*p, [&] { begin(*p, stream, waits); });
-  if (!p->executor->isPending())
-    return end(*p);
+  if (!p->executor->isPending()) {
+    int32_t status = end(*p);
+    if (p->siblings)
+      p->siblings->end();
+    return status;
+  }
   p->profile.enter(Part::Program);
   p->pending = true;
   return PIKORT_OK;

@@ -5,6 +5,7 @@
 #include "cpu/check/Check.h"
 #include "cpu/loops/Cycle.h"
 #include "cpu/loops/Strips.h"
+#include "ranks/Ranks.h"
 
 #include <algorithm>
 
@@ -71,6 +72,12 @@ void CPUExecutor::beginRun() {
   activeThreads = p.threads;
   startCycles(p);
   startStrips(p);
+  if (!p.ranks)
+    return;
+  p.ranks->beginRun();
+  for (size_t e = 0; e < p.edges.size(); ++e)
+    if (p.edges[e].exchanged && !queues[e])
+      queues[e] = std::make_unique<Queue>();
 }
 
 const pikoir_input *CPUExecutor::show(Kernel &kernel) { return &kernel.input; }
@@ -97,6 +104,21 @@ void CPUExecutor::endRun() {
 void CPUExecutor::noteError() {
   if (checker)
     checker->noteError();
+}
+
+/// The first bin of the unit, or of a stage that is divided by primitives the
+/// rank and the unit.
+int64_t CPUExecutor::placeOf(const KernelError &error) const {
+  const Stage *stage = p.findStage(error.stage);
+  if (error.unit == INT64_MAX || !stage)
+    return error.unit;
+  const Kernel &kernel = *kernels[static_cast<size_t>(
+      stage->host < 0 ? error.stage : stage->host)];
+  auto unit = static_cast<size_t>(error.unit);
+  if (stage->partition != PIKOIR_BINS || unit >= kernel.units.size())
+    return (int64_t(p.ranks->rank()) << 40) + error.unit;
+  int64_t first = kernel.units[unit].bucket_begin;
+  return kernel.calls ? kernel.calls[first].bin * stage->tiles : first;
 }
 
 std::string CPUExecutor::describe(int32_t code,

@@ -41,6 +41,7 @@ struct CPUExecutor : Executor {
   void clearKernels();
   bool reportsInOrder() const override { return checker != nullptr; }
   void noteError() override;
+  int64_t placeOf(const KernelError &error) const override;
   std::string describe(int32_t code, const std::string &plain) const override;
 
   // --- what kernels see: here, what there is

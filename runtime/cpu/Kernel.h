@@ -234,6 +234,9 @@ struct Kernel {
   std::vector<Array<uint32_t>> counts;
   int32_t pendingOutputs = 0;
   bool open = false;
+  /// Of a stage that collects and that ranks share: of each slot its bin, or
+  /// the rank, and its number there.
+  Array<uint64_t> slotNames;
 
   std::vector<std::unique_ptr<Lane>> lanes;
   size_t activeLanes = 0; ///< The first ones, which threads of this run take.

@@ -25,6 +25,7 @@ void Kernel::clear() {
   rankSize = 0;
   positions = 0;
   keys = {};
+  slotNames = {};
   counts.clear();
   units.clear();
   if (mirror)
@@ -169,6 +170,8 @@ static auto nameOf(const pikort_pipeline &p, const Kernel &kernel) {
 static const pikoir_input *begin(pikort_pipeline &p, Kernel &kernel) {
   if (p.status != PIKORT_OK)
     return nullptr;
+  p.runningKernel = 2 * p.stages[kernel.stage].launchOrder -
+                    static_cast<int32_t>(kernel.source >= 0);
   int32_t code = guarded(&p, nameOf(p, kernel), [&] {
     if (p.interrupted.load(std::memory_order_relaxed)) [[unlikely]]
       failInterrupted(p, kernel);

@@ -59,6 +59,8 @@ def runner_of(args, passes, first, **options):
         target = ["--cpu", args.cpu]
     if args.runner:
         target += ["--runner", args.runner]
+    if args.ranks:
+        target = [*target, "--ranks", str(args.ranks)]
     # A GPU takes no number of threads; its second frame is the first one's graph again.
     threads = (1, 2) if args.gpu else (1, 2, 7)
     return Runner(args.tool, args.mlir, passes, threads, strip=args.strip, target=target,
@@ -82,7 +84,7 @@ def command_of(args, first, seed):
     options = [f"--{name} {value}" for name, value in [
         ("features", args.features), ("without", args.without),
         ("leave-out", ",".join(passes_of(args, first))), ("strip", args.strip),
-        ("cpu", args.cpu), ("gpu", args.gpu),
+        ("cpu", args.cpu), ("gpu", args.gpu), ("ranks", args.ranks),
         ("runner", args.runner and f"'{args.runner}'")] if value]
     return " ".join([f"{sys.argv[0]} reduce --tool {args.tool} --seed {seed}", *options] +
                     ["--mlir"] * args.mlir)
@@ -170,6 +172,8 @@ def main():
                         help="the processor to compile for (this machine's)")
     parser.add_argument("--runner", default="", metavar="COMMAND",
                         help="runs code for --cpu aarch64: see piko-compare")
+    parser.add_argument("--ranks", type=int, default=0,
+                        help="compile for ranks, and run so many in threads")
     parser.add_argument("--strip", type=int, default=0,
                         help="primitives of a source in a strip (all)")
     parser.add_argument("--timeout", type=int, default=120, metavar="SECONDS",

@@ -1,6 +1,7 @@
 //===- Frame.cpp - A scene bound to a pipeline ----------------------------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 #include "Frame.h"
+#include "RankProcess.h"
 
 #include "Piko/CommandLine/Messages.h"
 #include "Piko/CommandLine/Progress.h"
@@ -83,6 +84,7 @@ Result<SceneInput> render::loadScene(const Options &options) {
 static bool setOptions(const Options &options, pikort_pipeline *pipeline) {
   return pikort_set_threads(pipeline, options.threads) == PIKORT_OK &&
          pikort_set_static_input(pipeline, 1) == PIKORT_OK &&
+         setRanks(options, pipeline) &&
          (options.mappings.empty() ||
           pikort_set_mappings(pipeline, options.mappings.c_str()) == PIKORT_OK);
 }

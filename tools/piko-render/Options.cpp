@@ -228,6 +228,14 @@ std::string findProblem(const Options &options) {
   if (options.explain && isReference)
     return "--explain is for pipelines that are compiled: nothing is measured "
            "of --target reference";
+  if (options.ranks > 0 && options.usesMPI)
+    return "--ranks: expected no --mpi beside it, whose processes are the "
+           "ranks";
+  if ((options.ranks > 0 || options.usesMPI) &&
+      options.load.target != ExecutionTarget::CPU)
+    return std::string(options.usesMPI ? "--mpi" : "--ranks") +
+           ": expected --target cpu, because ranks of other targets are not "
+           "supported";
   return {};
 }
 
@@ -262,6 +270,15 @@ void render::addSceneOptions(CommandLine &line, Options &options) {
       "a constant of the pipeline, if it is an int or a float");
   line.addNumber("--threads", "N", options.threads, "threads, 0 for all (0)", 0,
                  10000);
+  line.addNumber("--ranks", "N", options.ranks,
+                 "divide frames among so many ranks that own bins, each in "
+                 "threads of its own (none)",
+                 0, 1024);
+  line.add_flag("--mpi", options.usesMPI,
+                "the same for the processes that mpirun has started: the first "
+                "one prints and writes");
+  line.addNumber("--rank-seconds", "S", options.rankSeconds,
+                 "how long an exchange of --mpi may take, 0 for ever (60)", 0);
   line.addNumber("--memory-budget", "BYTES", options.memoryBudget,
                  "what bins may hold at a time: sources run in strips (0, no "
                  "budget)",
@@ -293,6 +310,7 @@ void render::addSceneOptions(CommandLine &line, Options &options) {
 }
 
 std::string render::checkOptions(const CommandLine &line, Options &options) {
+  options.load.synthesis.ranks |= options.ranks > 0 || options.usesMPI;
   options.sizeOption = line.findOption(ofSizes);
   options.sceneOption = line.findOption(ofScenes);
   return findProblem(options);

@@ -25,6 +25,9 @@ struct Options {
   std::vector<std::pair<std::string, std::string>> values; ///< of constants
   std::vector<std::string> fix; ///< what to specialize the pipeline for
   int threads = 0;
+  int ranks = 0; ///< in threads; 0 = one, or what $PIKO_RANKS says
+  bool usesMPI = false;
+  double rankSeconds = 60; ///< that an exchange may take
   int64_t memoryBudget = 0, stripSize = 0;
   int warmup = 5, frames = 30;
   int reruns = 0; ///< more frames, whose pictures must be that of the last

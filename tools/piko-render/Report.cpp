@@ -5,6 +5,8 @@
 #include "Frame.h"
 #include "Mappings.h"
 
+#include <pikort/ranks.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -85,6 +87,18 @@ Json reportStages(pikort_pipeline *pipeline, double runs) {
 }
 
 /// The parts of a mean frame, which sum to ms_mean.
+Json reportRanks(pikort_pipeline *pipeline, double runs) {
+  Json ranks = Json::array();
+  for (int32_t rank = 0; rank < pikort_rank_count(pipeline); ++rank) {
+    pikort_rank_totals totals{};
+    pikort_get_rank_totals(pipeline, rank, &totals);
+    ranks.push_back(Json::object(
+        {{"bytes", roundToThousandths(double(totals.bytes) / runs)},
+         {"peak_bytes", totals.peak}}));
+  }
+  return ranks;
+}
+
 Json reportTime(pikort_pipeline *pipeline, double runs) {
   pikort_time_stats stats{};
   pikort_get_time_stats(pipeline, &stats);
@@ -185,6 +199,8 @@ Json render::makeReport(const Options &options, const RunResult &result,
     return report;
   report["peak_bin_bytes"] = pikort_peak_bytes(pipeline);
   report["time"] = reportTime(pipeline, runs);
+  if (pikort_rank_count(pipeline) > 0)
+    report["ranks"] = reportRanks(pipeline, runs);
   if (!isTimed(options, pipeline))
     report["kernels"] = reportKernels(pipeline, runs);
   report["stages"] = reportStages(pipeline, runs);

@@ -9,6 +9,7 @@
 #include "Frame.h"
 #include "Mappings.h"
 #include "Options.h"
+#include "RankProcess.h"
 #include "Report.h"
 #include "Specialize.h"
 #include "Trace.h"
@@ -26,6 +27,7 @@
 #include <csignal>
 #include <cstddef>
 #include <cstdio>
+#include <limits>
 #include <span>
 #include <stdexcept>
 
@@ -46,10 +48,13 @@ private:
   Clock::time_point start = Clock::now();
 };
 
+bool failedTogether = false; ///< The error of a run is that of all ranks.
+
 /// What went wrong in a run, and how to see where in the text.
 Error errorOfRun(const Options &options, pikort_pipeline *pipeline,
                  int32_t status) {
   Error error = errorOf(pipeline);
+  failedTogether = status != PIKORT_RANK_FAILED;
   bool hasPlace = status == PIKORT_BIN_OUTSIDE ||
                   status == PIKORT_UPDATE_OUTSIDE ||
                   status == PIKORT_INDEX_OUTSIDE ||
@@ -61,11 +66,14 @@ Error errorOfRun(const Options &options, pikort_pipeline *pipeline,
   return error;
 }
 
-/// Runs the warm-up frames, then the timed ones.
+/// Runs the warm-up frames, then the timed ones. Ranks in processes of their
+/// own must run as many, so that no clock says how many.
 Result<FrameTimes> timeFrames(const Options &options,
                               pikort_pipeline *pipeline) {
   Progress bar("rendering");
-  double limit = 1000 * options.seconds,
+  bool isRank = rankProcess().isOne();
+  double limit = isRank ? std::numeric_limits<double>::infinity()
+                        : 1000 * options.seconds,
          total = options.warmup + options.frames;
   Stopwatch warmup;
   for (int i = 0; i < options.warmup && warmup.milliseconds() < limit / 4;
@@ -205,7 +213,8 @@ Result<Done> report(const Options &options, const RunResult &result,
     if (options.counters)
       text += printWork(*work, result.pixels);
     if (options.explain)
-      text += printWastes(wastes) + printMappings(pipeline);
+      text += printWastes(wastes) + printMappings(pipeline) +
+              printTraffic(pipeline);
   }
   std::printf("%s",
               options.json ? (writeLine(line) + "\n").c_str() : text.c_str());
@@ -325,6 +334,29 @@ int fail(const Error &error) {
   return 1;
 }
 
+int stopRank(int status) {
+  rankProcess().stop(/*fails=*/false);
+  return status;
+}
+
+/// An error of a run is that of all ranks, and the first one says it. Any other
+/// is this process's own, for which the others would wait.
+int failRank(const Error &error) {
+  RankProcess &process = rankProcess();
+  if (!process.isOne())
+    return fail(error);
+  if (failedTogether)
+    return stopRank(process.ranks().rank == 0 ? fail(error) : 1);
+  Error named = error;
+  if (named.message.find("rank ") == std::string::npos)
+    named.message =
+        "rank " + std::to_string(process.ranks().rank) + ": " + named.message;
+  fail(named);
+  std::fflush(stderr);
+  process.stop(/*fails=*/true);
+  return 1;
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
@@ -340,7 +372,8 @@ int main(int argc, char **argv) {
   }
   if (auto ok = applyTuned(*options); !ok)
     return fail(ok.error());
-  if (auto ok = renderScene(*options); !ok)
+  if (auto ok = rankProcess().start(*options); !ok)
     return fail(ok.error());
-  return 0;
+  auto ok = renderScene(*options);
+  return ok ? stopRank(0) : failRank(ok.error());
 }

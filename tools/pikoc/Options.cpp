@@ -144,6 +144,10 @@ void addSourceOptions(CommandLine &line, Options &options) {
       "--without", "PASS,...",
       [&](const std::string &text) { setWithout(text, options); },
       "passes of synthesis to leave out");
+  line.add_flag(
+      "--ranks", options.synthesis.ranks,
+      "divide runs among ranks, processes that own bins; a host gives "
+      "them by pikort/ranks.h");
   line.addNumber("--mapping-window", "FACTOR", options.synthesis.mappingWindow,
                  "hold a loop as vectors and as a scalar loop, of which the "
                  "runtime measures which is faster, where estimates are within "

@@ -22,10 +22,17 @@ struct PlannedEdge {
   int64_t keys = 0; ///< Words of its primitives' keys.
 };
 
+/// Of a run that several ranks share: the edges that lead from several of them
+/// to others, and the stages that several run.
+struct RankedEdges {
+  const llvm::DenseSet<mlir::Operation *> *exchanged = nullptr;
+  const llvm::DenseSet<mlir::Operation *> *divided = nullptr;
+};
+
 class ProgramPlan {
 public:
   /// At the kernels level or below.
-  explicit ProgramPlan(PipelineOp pipeline);
+  explicit ProgramPlan(PipelineOp pipeline, RankedEdges ranked = {});
 
   /// A cycle of stages that do not collect, or one stage.
   int getLoop(int stage) const { return loops.nodeOf[stage]; }
@@ -63,6 +70,9 @@ private:
   /// no more shows, as long as it comes so into the producer's bins.
   bool keepsBinOrder(const PlannedEdge &edge) const;
   bool needsBinOrderOnly(const PlannedEdge &edge) const;
+  /// Whether an edge is merged by keys for the sake of ranks.
+  bool mergesRanks(const PlannedEdge &edge) const;
+  bool isDivided(int stage) const;
   void findKeyed();
   void findWidths();
   bool isInsideLoop(const PlannedEdge &edge) const;
@@ -73,6 +83,7 @@ private:
   int64_t &widthAt(int stage);
 
   const NodeGraph components, loops;
+  const RankedEdges ranked;
   llvm::SmallVector<bool> ordered; ///< Stages whose order of primitives shows.
   llvm::SmallVector<bool> placed;  ///< Those that have bins.
   llvm::SmallVector<bool> keepsBins; ///< What comes stays in the bin before.

@@ -34,6 +34,8 @@ struct SynthesisOptions {
   double mappingWindow = 2;
   /// `stage:key=value`, as piko-set-directives takes them.
   std::vector<std::string> directives = {};
+  /// Divide runs among ranks (docs/Scale.md).
+  bool ranks = false;
 
   bool has(const std::string &pass) const;
   /// All passes that can be left out; results are the same without them.

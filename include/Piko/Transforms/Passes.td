@@ -11,6 +11,7 @@ include "Piko/Transforms/SpecializationPasses.td"
 include "Piko/Transforms/AuthoredPasses.td"
 include "Piko/Transforms/KernelPasses.td"
 include "Piko/Transforms/MachinePasses.td"
+include "Piko/Transforms/RankPasses.td"
 include "Piko/Transforms/CPUPasses.td"
 include "Piko/Transforms/VectorPasses.td"
 

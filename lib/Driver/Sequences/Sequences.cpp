@@ -104,8 +104,10 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   if (options.has("fuse-kernels"))
     pipeline.addPass(createFuseKernels());
   pipeline.addPass(createFormProgram());
-  if (options.has("form-strips"))
+  if (options.has("form-strips") && !options.ranks)
     pipeline.addPass(createFormStrips());
+  if (options.ranks)
+    pipeline.addPass(createPartitionProgram());
 }
 
 void piko::addMachineSequence(OpPassManager &passes,
@@ -115,7 +117,7 @@ void piko::addMachineSequence(OpPassManager &passes,
   pipeline.addPass(createFormWork());
   addCleanUp(passes);
   passes.nest<PipelineOp>().addPass(createForwardStores());
-  if (options.has("form-gbuffer")) {
+  if (options.has("form-gbuffer") && !options.ranks) {
     passes.addPass(createFormGBuffer());
     addCleanUp(passes);
   }

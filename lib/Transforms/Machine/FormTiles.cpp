@@ -201,6 +201,8 @@ std::optional<Reason> TileFormer::whyNotClear(ImageOp image) {
       return WalkResult::interrupt();
     if (auto clear = dyn_cast<ClearOp>(op))
       isCleared |= llvm::is_contained(clear.getStates(), name);
+    if (auto keep = dyn_cast<KeepOp>(op); keep && keep.getStateAttr() == name)
+      reason.emplace(Reason{keep.getLoc(), "ranks remember what it held"});
     if (auto before = dyn_cast<LaunchOp>(op))
       for (Operation *access :
            accesses.get(before.getKernelOp(), name.getAttr()))

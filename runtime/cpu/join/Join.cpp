@@ -21,6 +21,7 @@
 #include "cpu/Parallel.h"
 #include "cpu/loops/Cycle.h"
 #include "cpu/loops/Strips.h"
+#include "ranks/Ranks.h"
 
 #include <algorithm>
 #include <cstring>
@@ -240,7 +241,11 @@ public:
   void run() {
     makeRoom();
     if (edge_.keyed()) {
-      stream_.keys.width = from_.collects() ? 2 : kernel_.keys.width + 1;
+      isShared_ = from_.collects() && from_.partition != PIKOIR_FIRST_RANK;
+      if (isShared_ && !kernel_.slotNames)
+        nameSlots();
+      stream_.keys.width =
+          from_.collects() ? 2 + isShared_ : kernel_.keys.width + 1;
       stream_.keys.words =
           Array<uint64_t>(p_.memory, stream_.count * stream_.keys.width);
     }
@@ -267,6 +272,33 @@ private:
     } else {
       stream_.itemStorage = Array<uint8_t>(p_.memory, stream_.count * size_);
       stream_.items = stream_.itemStorage.data();
+    }
+  }
+
+  /// Other ranks run what is between these, so that a slot's rank here says
+  /// nothing there. Parts of a source are in the order of ranks.
+  void nameSlots() {
+    kernel_.slotNames = Array<uint64_t>(p_.memory, kernel_.slots());
+    if (from_.partition == PIKOIR_PARTS) {
+      auto part = static_cast<uint64_t>(p_.ranks ? p_.ranks->rank() : 0) << 32;
+      for (int64_t i = 0; i < kernel_.slots(); ++i)
+        kernel_.slotNames[i] = part + static_cast<uint64_t>(rankOf(i));
+      return;
+    }
+    for (int64_t bin = 0; bin < from_.bins() && !kernel_.calls; ++bin) {
+      int64_t begin = kernel_.offsets[bin * from_.tiles],
+              end = kernel_.offsets[(bin + 1) * from_.tiles];
+      for (int64_t i = begin; i < end; ++i)
+        kernel_.slotNames[i] =
+            (uint64_t(bin) << 32) + static_cast<uint64_t>(rankOf(i) - begin);
+    }
+    uint64_t number = 0;
+    for (int64_t i = 0; i < kernel_.calls.size(); ++i) {
+      auto bin = static_cast<uint64_t>(kernel_.calls[i].bin);
+      number = i > 0 && kernel_.calls[i - 1].bin == kernel_.calls[i].bin
+                   ? number + 1
+                   : bin << 32;
+      kernel_.slotNames[i] = number;
     }
   }
 
@@ -381,6 +413,11 @@ private:
     uint64_t *key = &stream_.keys.words[to * stream_.keys.width];
     if (from_.collects()) { // a new lineage
       key[0] = uint64_t(from_.root) << 32 | kernel_.launch;
+      if (isShared_) {
+        key[1] = kernel_.slotNames[slot];
+        key[2] = ordinal;
+        return;
+      }
       key[1] = static_cast<uint64_t>(rankOf(slot)) << 32 | ordinal;
       return;
     }
@@ -401,6 +438,7 @@ private:
   Region region_;
   Segments buckets_, ordinals_;
   Array<uint32_t> starts_, pairStarts_;
+  bool isShared_ = false; ///< By ranks; it collects.
 };
 
 } // namespace
@@ -452,6 +490,8 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
                                             " to be assigned before"};
     concatenateBuckets(p, kernel, 0, stream);
     releasePort(kernel, 0);
+    if (p.ranks)
+      p.ranks->filter(stage, stream, stream.pairStorage);
   }
   return stream;
 }
@@ -563,7 +603,8 @@ Stream piko::rt::gatherInputs(pikort_pipeline &p, const Stage &stage,
     Strips *strips = edge.leavesStrips ? stripsOf(p, from) : nullptr;
     if (strips && !strips->isFinished())
       failOrder(stage, from);
-    if (cycle || (strips && strips->isDivided()))
+    bool waits = cycle || (strips && strips->isDivided());
+    if (waits || (fromOutside && edge.exchanged && p.ranks))
       add(queueOf(p, edge).take(edge.keyWidth));
     else if (fromOutside)
       add(gatherEdge(p, edge));

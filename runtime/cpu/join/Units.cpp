@@ -14,6 +14,7 @@
 
 #include "common/JoinRules.h"
 #include "cpu/Kernel.h"
+#include "ranks/Ranks.h"
 
 #include <algorithm>
 #include <atomic>
@@ -59,7 +60,8 @@ public:
 
   void cutBuckets() {
     const BinSchedule &schedule = stage_.scheduleOf(0);
-    if (!stage_.binSchedules && schedule.kind == PIKOIR_SERIALIZE)
+    if (!stage_.binSchedules && schedule.kind == PIKOIR_SERIALIZE &&
+        !(p_.ranks && stage_.visitsAll))
       return add(0, stage_.buckets, 0, kernel_.positions, firstCore);
     int64_t chunk = sizeOf(schedule);
     // What waits for a bin may do much, whatever there is in it.
@@ -73,6 +75,11 @@ public:
     };
     for (int64_t bucket = 0; bucket < stage_.buckets; ++bucket) {
       int64_t begin = offsets_[bucket], end = offsets_[bucket + 1];
+      if (stage_.visitsAll && !owns(bucket / stage_.tiles)) {
+        flush(bucket);
+        first = bucket + 1;
+        continue;
+      }
       const BinSchedule &now = stage_.scheduleOf(bucket / stage_.tiles);
       int64_t nowOwner = ownerOf(now);
       if (owner != nowOwner)
@@ -147,6 +154,10 @@ public:
   }
 
 private:
+  /// Whether this rank runs a bin.
+  bool owns(int64_t bin) const {
+    return !p_.ranks || p_.ranks->owns(stage_, bin);
+  }
   int64_t ownerOf(const BinSchedule &schedule) const {
     if (schedule.kind == PIKOIR_SERIALIZE)
       return firstCore;
@@ -192,7 +203,7 @@ private:
     for (int64_t bin = 0; bin < stage_.bins(); ++bin) {
       const BinSchedule &schedule = stage_.scheduleOf(bin);
       int64_t count = offsets_[bin + 1] - offsets_[bin];
-      if (count > 0 || (schedule.everyBin && kernel_.firstRound))
+      if (count > 0 || (schedule.everyBin && kernel_.firstRound && owns(bin)))
         body(bin, count, piko::join::callSize(schedule.batch, count));
     }
   }

@@ -3,6 +3,7 @@
 
 #include "cpu/Kernel.h"
 #include "cpu/Parallel.h"
+#include "ranks/Ranks.h"
 
 #include <algorithm>
 #include <cstring>
@@ -79,11 +80,16 @@ void piko::rt::prepareState(pikort_pipeline &p) {
 // --- Images that kernels clear ----------------------------------------------
 
 /// The bins that no unit or call of a kernel is for.
-static std::vector<int64_t> findLeftBins(const Stage &stage,
+static std::vector<int64_t> findLeftBins(const pikort_pipeline &p,
+                                         const Stage &stage,
                                          const Kernel &kernel) {
   std::vector<int64_t> left;
-  if (stage.visitsAll && !stage.takesList())
+  if (stage.visitsAll && !stage.takesList()) {
+    for (int64_t bin = 0; p.ranks && bin < stage.bins(); ++bin)
+      if (!p.ranks->owns(stage, bin))
+        left.push_back(bin);
     return left;
+  }
   std::vector<bool> called(stage.takesList() ? stage.bins() : 0);
   for (int64_t call = 0; call < kernel.calls.size(); ++call)
     called[kernel.calls[call].bin] = true;
@@ -155,7 +161,7 @@ void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
     return;
   Part before = p.profile.part();
   p.profile.enter(Part::State);
-  std::vector<int64_t> left = findLeftBins(stage, kernel);
+  std::vector<int64_t> left = findLeftBins(p, stage, kernel);
   std::vector<BinRun> runs = findRuns(stage, left);
   for (int32_t id : stage.clears)
     if (static_cast<int64_t>(left.size()) == stage.bins())

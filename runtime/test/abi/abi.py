@@ -20,7 +20,8 @@ import subprocess
 import sys
 
 LIST = pathlib.Path(__file__).with_name("abi.txt")
-HEADERS = ["pikort.h", "abi.h", "abi_setup.h", "grid.h", "emission.h"]
+HEADERS = ["pikort.h", "abi.h", "abi_setup.h", "grid.h", "emission.h", "ranks.h",
+           "abi_ranks.h"]
 MEMBER = re.compile(r"^ +(\d+) \|   (\S.*) (\w+)$")
 
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -125,6 +126,13 @@ static void addCompilerOptions(CommandLine &line, Options &options) {
         options.check = *check;
       },
       "checking mode, on both sides");
+  line.addText(
+      "--ranks", "N",
+      [&](const std::string &text) {
+        options.synthesis.ranks = true;
+        setenv("PIKO_RANKS", text.c_str(), /*overwrite=*/1);
+      },
+      "compiled for ranks, and so many in threads");
   line.addText(
       "--without", "PASS,..",
       [&](const std::string &text) {

@@ -9,8 +9,19 @@
 
 #include "mlir/Dialect/ControlFlow/IR/ControlFlowOps.h"
 
+#include "pikort/abi_ranks.h"
+
 using namespace mlir;
 using namespace piko;
+
+static_assert(int(AtomicKind::Add) == PIKOIR_SHARE_ADD &&
+              int(AtomicKind::MinS) == PIKOIR_SHARE_MIN &&
+              int(AtomicKind::MaxS) == PIKOIR_SHARE_MAX &&
+              int(AtomicKind::MinU) == PIKOIR_SHARE_UMIN &&
+              int(AtomicKind::MaxU) == PIKOIR_SHARE_UMAX &&
+              int(AtomicKind::And) == PIKOIR_SHARE_AND &&
+              int(AtomicKind::Or) == PIKOIR_SHARE_OR &&
+              int(AtomicKind::Xor) == PIKOIR_SHARE_XOR);
 
 namespace {
 
@@ -45,6 +56,7 @@ private:
   void createRounds(RoundsOp rounds);
   void createSpread(Operation &statement);
   void createClear(ClearOp clear);
+  void createRankStatement(Operation &statement);
   void createStatements(Block &statements);
   void createStrips(StripsOp strips);
   void checkStatus() {
@@ -151,6 +163,50 @@ void RunWriter::createClear(ClearOp clear) {
                                    numbers.states.lookup(name.getAttr()))});
 }
 
+/// What ranks do between launches.
+void RunWriter::createRankStatement(Operation &statement) {
+  auto i32 = [&](int64_t v) { return createI32(builder, loc, v); };
+  auto i64 = [&](int64_t v) { return createI64(builder, loc, v); };
+  auto numberOf = [&](FlatSymbolRefAttr state) {
+    return i32(numbers.states.lookup(state.getAttr()));
+  };
+  Value status;
+  if (auto exchange = dyn_cast<ExchangeOp>(statement)) {
+    auto edge = cast<EdgeOp>(getOrigin(exchange.getEdge()));
+    status = call(PIKO_RUNTIME_FUNCTION(pikoir_exchange),
+                  {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
+                   i32(edge.getPort())});
+  } else if (auto keep = dyn_cast<KeepOp>(statement)) {
+    status = call(PIKO_RUNTIME_FUNCTION(pikoir_keep),
+                  {numberOf(keep.getStateAttr())});
+  } else if (auto share = dyn_cast<ShareOp>(statement)) {
+    FlatSymbolRefAttr name = share.getStateAttr();
+    RecordOp record = context.record(
+        getStateRecord(SymbolTable::lookupSymbolIn(pipeline, name)));
+    ArrayAttr reduce = share.getReduceAttr();
+    for (size_t i = 0; reduce && i < reduce.size(); i += 2) {
+      FieldAttr field = record.getField(cast<StringAttr>(reduce[i]).getValue());
+      auto kind =
+          *symbolizeAtomicKind(cast<StringAttr>(reduce[i + 1]).getValue());
+      int64_t bytes = field.getType().getIntOrFloatBitWidth() / 8;
+      for (int64_t element = 0; element < field.getElementCount(); ++element)
+        context.call(builder, loc, PIKO_RUNTIME_FUNCTION(pikoir_share_field),
+                     {frame, numberOf(name),
+                      i64(field.getElementOffset(element)), i64(1), i64(0),
+                      i64(bytes), i32(int64_t(kind))});
+    }
+    FlatSymbolRefAttr stage = share.getStageAttr();
+    status =
+        call(PIKO_RUNTIME_FUNCTION(pikoir_share),
+             {numberOf(name),
+              i32(stage ? int64_t(numbers.stages.lookup(stage.getAttr())) : -1),
+              i32((share.getFromFirst() ? PIKOIR_SHARE_FROM_FIRST : 0) |
+                  (share.getToFirst() ? PIKOIR_SHARE_TO_FIRST : 0))});
+  }
+  if (status)
+    check(status, createBlock(exit));
+}
+
 void RunWriter::createStatements(Block &statements) {
   for (Operation &op : statements) {
     if (auto clear = dyn_cast<ClearOp>(op))
@@ -163,6 +219,8 @@ void RunWriter::createStatements(Block &statements) {
       createWaves(waves);
     else if (auto rounds = dyn_cast<RoundsOp>(op))
       createRounds(rounds);
+    else
+      createRankStatement(op);
     if (isa<WavesOp, RoundsOp>(op))
       checkStatus();
   }

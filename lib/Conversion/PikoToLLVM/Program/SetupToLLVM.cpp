@@ -10,6 +10,8 @@
 #include "Piko/Dialect/Piko/IR/PikoCount.h"
 #include "Piko/Dialect/Piko/IR/PikoFixed.h"
 
+#include "pikort/abi_ranks.h"
+
 using namespace mlir;
 using namespace piko;
 
@@ -54,6 +56,7 @@ private:
   void declareMappings(KernelOp kernel);
   void declareRoots(ProgramOp program);
   void declareRegion(Operation *region);
+  void declareRanks(ProgramOp program);
   Value recordBytes(FlatSymbolRefAttr record, ArrayAttr numbers);
 
   const PipelineNumbers &numbers;
@@ -355,6 +358,25 @@ void SetupWriter::declareRegion(Operation *region) {
           i32(waves.getKeys().value_or(0))});
 }
 
+/// Who runs which stage, in the order of launches, and what is exchanged.
+void SetupWriter::declareRanks(ProgramOp program) {
+  llvm::DenseMap<int32_t, int64_t> ways;
+  for (auto partition : program.getBodyBlock()->getOps<PartitionOp>())
+    ways[numbers.stages.lookup(partition.getStageAttr().getAttr())] =
+        partition.getParts() ? PIKOIR_PARTS : PIKOIR_BINS;
+  if (!program.getRanks())
+    return;
+  for (int32_t stage : findStages(program, numbers))
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_partition),
+         {i32(stage), i32(ways.lookup(stage))});
+  program.walk([&](ExchangeOp exchange) {
+    auto edge = cast<EdgeOp>(getOrigin(exchange.getEdge()));
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_exchange),
+         {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
+          i32(edge.getPort())});
+  });
+}
+
 void SetupWriter::run(ProgramOp program) {
   call(PIKO_RUNTIME_FUNCTION(pikoir_declare_pipeline),
        {text(pipeline.getSymName()), i32(pipeline.getRank())});
@@ -384,6 +406,7 @@ void SetupWriter::run(ProgramOp program) {
   for (auto kernel : pipeline.getOps<KernelOp>())
     declareMappings(kernel);
   declareRoots(program);
+  declareRanks(program);
   program.walk<WalkOrder::PreOrder>([&](Operation *op) {
     if (auto join = dyn_cast<JoinOp>(op))
       declareJoin(join);

@@ -19,7 +19,8 @@ def Piko_ProgramOp : Piko_Op<"program", [
 
     `roots` are the stages that collect and emit: each begins a lineage, after
     those of the sources, and in this order. Stages of one `piko.rounds` share
-    one.
+    one. A program of `ranks` is run by several processes together
+    (`piko.partition`).
 
     ```mlir
     piko.record @F {"x" : i32 at 0} size 4 align 4
@@ -69,10 +70,11 @@ def Piko_ProgramOp : Piko_Op<"program", [
     ```
   }];
   let arguments = (ins OptionalAttr<
-    TypedArrayAttrBase<FlatSymbolRefAttr, "stages that begin a lineage">>:$roots);
+    TypedArrayAttrBase<FlatSymbolRefAttr, "stages that begin a lineage">>:$roots,
+    UnitAttr:$ranks);
   let regions = (region SizedRegion<1>:$body);
   let assemblyFormat = [{
-    (`roots` $roots^)? attr-dict-with-keyword custom<IsolatedBody>($body)
+    (`roots` $roots^)? (`ranks` $ranks^)? attr-dict-with-keyword custom<IsolatedBody>($body)
   }];
   let hasRegionVerifier = 1;
   let extraClassDeclaration = [{
@@ -219,6 +221,82 @@ def Piko_WaitOp : Piko_ProgramStatement<"wait"> {
   }];
   let arguments = (ins FlatSymbolRefAttr:$stage);
   let assemblyFormat = "$stage attr-dict";
+  let hasVerifier = 1;
+}
+
+def Piko_PartitionOp : Piko_ProgramStatement<"partition"> {
+  let summary = "which rank runs what of a stage";
+  let description = [{
+    Of a program that several processes, its ranks, run together. With `bins` a
+    rank runs the bins that it owns; with `parts` what it has been fed or has
+    itself emitted, where all primitives are in one bin. A stage of which the
+    program does not say this is run by the first rank alone.
+
+    ```mlir
+    piko.partition @rasterize bins
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$stage, UnitAttr:$parts);
+  let assemblyFormat = "$stage (`parts` $parts^) : (`bins`)? attr-dict";
+  let hasVerifier = 1;
+}
+
+def Piko_ExchangeOp : Piko_ProgramStatement<"exchange", [
+    SameOperandsAndResultType]> {
+  let summary = "brings primitives to the ranks that run what takes them";
+  let description = [{
+    All ranks run it alike: counts first, then records, each with the bins that
+    the receiver owns of it. By the keys that the join names, what comes from
+    several ranks is merged into the order of lineage.
+
+    ```mlir
+    %here = piko.exchange %fragments : !piko.edge<@Fragment>
+    ```
+  }];
+  let arguments = (ins Piko_EdgeType:$edge);
+  let results = (outs Piko_EdgeType:$received);
+  let assemblyFormat = "$edge attr-dict `:` qualified(type($edge))";
+}
+
+def Piko_KeepOp : Piko_ProgramStatement<"keep"> {
+  let summary = "remembers what a piece of state holds now";
+  let description = [{
+    All ranks hold the same then. A `piko.share` finds by it what each has
+    changed.
+
+    ```mlir
+    piko.keep @histogram
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state);
+  let assemblyFormat = "$state attr-dict";
+  let hasVerifier = 1;
+}
+
+def Piko_ShareOp : Piko_ProgramStatement<"share"> {
+  let summary = "brings together what ranks have written of a piece of state";
+  let description = [{
+    After it all ranks hold the same, or, with `to_first`, the first rank holds
+    all. What each brings is the pixels of the bins that it owns `of` a stage;
+    or, with `from_first`, all that the first rank holds; or else the elements
+    that it has changed since the `piko.keep` of this state. Fields that several
+    ranks change `reduce`, each by one operation: the changes are combined in the
+    order of ranks.
+
+    ```mlir
+    piko.share @depth of @rasterize to_first
+    piko.share @sums from_first
+    piko.share @histogram reduce ["value", "add"]
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$state,
+                       OptionalAttr<FlatSymbolRefAttr>:$stage,
+                       UnitAttr:$from_first, UnitAttr:$to_first,
+                       OptionalAttr<StrArrayAttr>:$reduce);
+  let assemblyFormat = [{
+    $state (`of` $stage^)? (`from_first` $from_first^)? (`to_first` $to_first^)?
+    (`reduce` $reduce^)? attr-dict
+  }];
   let hasVerifier = 1;
 }
 

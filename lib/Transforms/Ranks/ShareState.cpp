@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//
+// Where ranks use state that others have written. Each piece of state is clean,
+// that is the same on all ranks, or has been written since in one of three
+// ways: by the first rank alone, by owners in their bins, or anywhere. A
+// statement that uses it otherwise than so shares it before. What is written
+// anywhere is found by comparison with what was kept.
+
+#include "Ranks/Partition.h"
+#include "Support/StateAccess.h"
+
+#include "Piko/Dialect/Piko/IR/Marks.h"
+
+#include "llvm/ADT/MapVector.h"
+
+using namespace mlir;
+using namespace piko;
+
+namespace {
+
+/// How a statement uses a piece of state.
+struct Use {
+  int kinds = 0;          ///< Bits of StateAccess.
+  bool staysInBin = true; ///< All accesses are to pixels of the call's bin.
+  /// By field, what atomic operations do; none where they differ.
+  llvm::MapVector<StringAttr, std::optional<AtomicKind>> atomics;
+};
+using Uses = llvm::MapVector<Attribute, Use>;
+
+enum class Way { Clean, FirstRank, Owners, Anywhere };
+
+struct Written {
+  Way way = Way::Clean;
+  StageOp stage; ///< Of owners.
+  llvm::MapVector<StringAttr, std::optional<AtomicKind>> atomics;
+  bool onlyAtomics = false;
+};
+
+class StateSharer {
+public:
+  StateSharer(ProgramOp program, const Divisions &divisions)
+      : program(program), pipeline(getPipeline(program)), divisions(divisions),
+        builder(program.getContext()) {}
+
+  void run();
+
+private:
+  void visit(Operation *statement);
+  void use(Operation *statement, Attribute state, const Use &use,
+           Division division, StageOp stage);
+  bool continues(const Written &before, const Use &use, Way way,
+                 Division division, StageOp stage);
+  void share(Attribute state, bool atEnd);
+  bool outlivesRun(Attribute state);
+
+  ProgramOp program;
+  PipelineOp pipeline;
+  const Divisions &divisions;
+  OpBuilder builder;
+  llvm::MapVector<Attribute, Written> written;
+};
+
+} // namespace
+
+static bool isInBin(Operation *access) {
+  if (isa<UpdateOp>(access))
+    return true; // by its rule
+  return isa<LoadOp, StoreOp>(access) && access->hasAttr(marks::inside) &&
+         access->getParentOfType<ProcessOp>();
+}
+
+static void addUses(KernelOp kernel, Uses &uses) {
+  kernel.walk([&](Operation *op) {
+    auto [state, kinds] = getStateAccess(op);
+    if (!state || lookupInPipeline<ConstantOp>(op, state))
+      return;
+    Use &use = uses[state];
+    use.kinds |= kinds;
+    use.staysInBin &= isInBin(op);
+    if (auto atomic = dyn_cast<AtomicOp>(op)) {
+      auto [known, isNew] =
+          use.atomics.insert({atomic.getFieldAttr(), atomic.getKind()});
+      if (!isNew && known->second != atomic.getKind())
+        known->second.reset();
+    }
+  });
+}
+
+/// Images and buffers that a source sizes are cleared when a run begins.
+bool StateSharer::outlivesRun(Attribute state) {
+  auto buffer =
+      lookupInPipeline<BufferOp>(program, cast<FlatSymbolRefAttr>(state));
+  return buffer && !buffer.getPerSource();
+}
+
+void StateSharer::share(Attribute state, bool atEnd) {
+  Written now = std::exchange(written[state], {});
+  auto name = cast<FlatSymbolRefAttr>(state);
+  bool toFirst = atEnd && !outlivesRun(state);
+  if (now.way == Way::Clean || (now.way == Way::FirstRank && toFirst))
+    return;
+  FlatSymbolRefAttr owner;
+  if (now.way == Way::Owners)
+    owner = FlatSymbolRefAttr::get(now.stage.getSymNameAttr());
+  SmallVector<Attribute> reduce;
+  if (now.way == Way::Anywhere)
+    for (auto [field, kind] : now.atomics) {
+      reduce.push_back(field);
+      reduce.push_back(builder.getStringAttr(stringifyAtomicKind(*kind)));
+    }
+  auto unit = [&](bool isSet) {
+    return isSet ? builder.getUnitAttr() : UnitAttr();
+  };
+  ShareOp::create(builder, program.getLoc(), name, owner,
+                  unit(now.way == Way::FirstRank), unit(toFirst),
+                  reduce.empty() ? ArrayAttr() : builder.getArrayAttr(reduce));
+}
+
+/// Whether a statement may use the state as it is on each rank, because it uses
+/// it as the statements before it did.
+bool StateSharer::continues(const Written &before, const Use &use, Way way,
+                            Division division, StageOp stage) {
+  switch (before.way) {
+  case Way::Clean:
+    return true;
+  case Way::FirstRank:
+    return division == Division::First;
+  case Way::Owners:
+    return division == Division::Bins && use.staysInBin &&
+           StageOp(before.stage).getBins() == stage.getBins();
+  case Way::Anywhere:
+    // Changes of one kind are combined, however many kernels make them.
+    return division != Division::First && before.onlyAtomics &&
+           use.kinds == StateAccess::changesAtomically &&
+           llvm::all_of(use.atomics, [&](const auto &atomic) {
+             auto known = before.atomics.find(atomic.first);
+             return known == before.atomics.end() ||
+                    known->second == atomic.second;
+           });
+  }
+  return false;
+}
+
+void StateSharer::use(Operation *statement, Attribute state, const Use &use,
+                      Division division, StageOp stage) {
+  builder.setInsertionPoint(statement);
+  bool writes = use.kinds & ~StateAccess::reads;
+  Way way = !writes                                        ? Way::Clean
+            : division == Division::First                  ? Way::FirstRank
+            : division == Division::Bins && use.staysInBin ? Way::Owners
+                                                           : Way::Anywhere;
+  if (!continues(written[state], use, way, division, stage))
+    share(state, /*atEnd=*/false);
+  if (!writes)
+    return;
+  Written &now = written[state];
+  if (way == Way::Anywhere && now.way == Way::Clean) {
+    KeepOp::create(builder, statement->getLoc(),
+                   cast<FlatSymbolRefAttr>(state));
+    now.onlyAtomics = use.kinds == StateAccess::changesAtomically;
+  }
+  now.way = way;
+  now.stage = stage;
+  for (const auto &atomic : use.atomics)
+    now.atomics.insert(atomic);
+}
+
+void StateSharer::visit(Operation *statement) {
+  Uses uses;
+  Division division = Division::First; // of cycles
+  StageOp stage;
+  statement->walk([&](LaunchOp launch) {
+    KernelOp kernel = launch.getKernelOp();
+    addUses(kernel, uses);
+    if (SmallVector<StageOp> stages = getStages(kernel); !stages.empty()) {
+      stage = stages.front();
+      if (launch == statement)
+        division = divisions.lookup(stage);
+    } else if (launch == statement) {
+      division = Division::Parts; // AssignBin of a source, which only reads
+    }
+  });
+  for (const auto &[state, used] : uses)
+    use(statement, state, used, division, stage);
+}
+
+void StateSharer::run() {
+  SmallVector<Operation *> statements;
+  for (Operation &op : *program.getBodyBlock())
+    if (isa<LaunchOp, WavesOp, RoundsOp>(op))
+      statements.push_back(&op);
+  for (Operation *statement : statements)
+    visit(statement);
+  builder.setInsertionPointToEnd(program.getBodyBlock());
+  SmallVector<Attribute> states;
+  for (const auto &[state, now] : written)
+    states.push_back(state);
+  for (Attribute state : states)
+    share(state, /*atEnd=*/true);
+}
+
+void piko::shareState(ProgramOp program, const Divisions &divisions) {
+  StateSharer(program, divisions).run();
+}

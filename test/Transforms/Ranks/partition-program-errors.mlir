@@ -1,0 +1,79 @@
+// RUN: not piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-partition-program))' %s 2>&1 | FileCheck %s
+// RUN: piko-opt --pass-pipeline='builtin.module(piko.pipeline(piko-form-kernels,piko-form-program,piko-partition-program))' --split-input-file --verify-diagnostics %s
+
+// CHECK: error: expected a piko.program, which piko-form-program makes
+piko.record @F {"x" : i32 at 0, "f" : f32 at 4} size 8 align 4
+piko.pipeline @Whole rank 1 {
+  piko.image @pixels : @F rank 1
+  piko.buffer @sums : @F
+  piko.source @update
+  piko.source @list
+  piko.source @add
+  piko.source @take
+  piko.source @two
+  piko.edge @again[0] -> @again
+  piko.source @again
+  // expected-remark @below {{stage 'update' runs on the first rank alone: it updates pixels, and its only bin is the whole domain; give it bins of a size}}
+  piko.stage @update bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.update @pixels[%x : i32] {
+      ^bb0(%old: i32, %z: f32):
+        piko.yield [%x, %z : i32, f32]
+      }
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'list' runs on the first rank alone: its only bin is the whole domain, and must be complete; give it bins of a size}}
+  piko.stage @list bins [0] threads 1 : list @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.list<@F>):
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'add' runs on the first rank alone: it adds floats, whose sum depends on the order}}
+  piko.stage @add bins [0] threads 1 : @F -> [] {
+    piko.schedule load_balance unordered
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %value = piko.get %f "f" : !piko.prim<@F> -> f32
+      piko.atomic add_float @sums[%i : index] "f", %value : f32
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'take' runs on the first rank alone: it uses what an atomic operation returns}}
+  piko.stage @take bins [0] threads 1 : @F -> [] {
+    piko.schedule load_balance unordered
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %old = piko.atomic add @sums[%i : index] "x", %x : i32 -> i32
+      piko.store %old, @sums[%i : index] "x" : i32
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'two' runs on the first rank alone: it changes one field by two kinds of atomic operations}}
+  piko.stage @two bins [0] threads 1 : @F -> [] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %i = arith.constant 0 : index
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      piko.atomic add @sums[%i : index] "x", %x : i32
+      piko.atomic xor @sums[%i : index] "x", %x : i32
+      piko.return
+    }
+  }
+  // expected-remark @below {{stage 'again' runs on the first rank alone: it is on a cycle}}
+  piko.stage @again bins [0] threads 1 : @F -> [@F] {
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %z = piko.get %f "f" : !piko.prim<@F> -> f32
+      piko.emit 0 (%x, %z) : i32, f32
+      piko.return
+    }
+  }
+}

@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+"""Renders by processes that mpirun starts, and compares with one process."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe"]
+PIPES = [("raster", "Fused"), ("raster", "Baseline")]
+
+
+def render(args, before, options):
+    command = [*before, args.render, "--json", "--warmup", "0", "--frames", "2",
+               "--width", "160", "--height", "120", "--threads", "2", *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=200)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: {done.stdout}{done.stderr}")
+    lines = done.stdout.splitlines()
+    if len(lines) != 1:
+        sys.exit(f"expected the first rank alone to print, but got: {done.stdout}")
+    return json.loads(lines[0])["hash"]
+
+
+def check_error(args, ranks):
+    """An error of a run is said once, and that of one process."""
+    options = ["--warmup", "0", "--frames", "1", "--memory-budget", "1",
+               str(Path(args.examples) / "raster/raster.piko.cpp"), "--pipe", "Fused",
+               args.scene]
+    done = subprocess.run([*MPIRUN, "-np", str(ranks), args.render, "--mpi", *options],
+                          capture_output=True, text=True, timeout=200)
+    errors = [l for l in done.stderr.splitlines() if "piko-render: error" in l]
+    if done.returncode == 0 or len(errors) != 1 or "out of memory" not in errors[0] \
+            or "rank " not in errors[0]:
+        sys.exit(f"expected one error that names a rank, but got: {done.stderr}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--render", required=True)
+    parser.add_argument("--examples", required=True)
+    parser.add_argument("--scene", required=True)
+    parser.add_argument("--ranks", default="1,2,3,4")
+    args = parser.parse_args()
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    for example, pipe in PIPES:
+        file = Path(args.examples) / example / f"{example}.piko.cpp"
+        options = [str(file), "--pipe", pipe, args.scene]
+        expected = render(args, [], options)
+        for ranks in map(int, args.ranks.split(",")):
+            got = render(args, [*MPIRUN, "-np", str(ranks)], ["--mpi", *options])
+            if got != expected:
+                sys.exit(f"{pipe} on {ranks} ranks: expected {expected}, but got {got}")
+            print(f"{pipe} on {ranks} ranks: {got}")
+    check_error(args, 3)
+
+
+if __name__ == "__main__":
+    main()
