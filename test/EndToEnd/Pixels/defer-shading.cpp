@@ -13,7 +13,7 @@
 // CASE: --pipe TwoImages --domain 45 37 --count 300
 // CASE: --pipe TwoWays --domain 45 37 --count 300
 // CASE: --pipe Points --domain 20 9 --count 900
-// CASE: --pipe After --domain 20 9 --count 900
+// CASE: --pipe Behind --domain 20 9 --count 900
 // CASE: --pipe Picture --domain 45 37 --count 300
 // CASE: --pipe Kinds --domain 45 37 --count 300
 // CASE: --pipe Lists --domain 45 37 --count 300
@@ -21,7 +21,7 @@
 // RUN: piko-compare %s --pipe Nearest --domain 45 37 --count 300 --runs 1 --strip 7 | FileCheck %s
 // CHECK: equal
 //
-// RUN: pikoc %s --pipe Nearest,OneRecord,Returns,LastWins,TwoImages,TwoWays,Points,After,Picture,Kinds,Lists --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
+// RUN: pikoc %s --pipe Nearest,OneRecord,Returns,LastWins,TwoImages,TwoWays,Points,Behind,Picture,Kinds,Lists --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=ONCE
 // ONCE-COUNT-11: remark: what is written to '{{color|image}}' is computed once for each pixel
 // ONCE-NOT: remark: what is written to '{{color|image}}' is computed once for each pixel
 // RUN: pikoc %s --pipe Counts --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=OFTEN
