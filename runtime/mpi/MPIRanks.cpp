@@ -143,15 +143,15 @@ int32_t pikort_make_mpi_ranks(const void *communicator, double seconds,
   context->seconds = seconds;
   *ranks = {0, 1, context, exchange, message};
   MPI_Comm from = *static_cast<const MPI_Comm *>(communicator);
-  bool made = check(*context, "MPI_Comm_dup",
-                    MPI_Comm_dup(from, &context->communicator)) &&
-              check(*context, "MPI_Comm_set_errhandler",
-                    MPI_Comm_set_errhandler(context->communicator,
-                                            MPI_ERRORS_RETURN)) &&
-              check(*context, "MPI_Comm_rank",
-                    MPI_Comm_rank(context->communicator, &ranks->rank)) &&
-              check(*context, "MPI_Comm_size",
-                    MPI_Comm_size(context->communicator, &ranks->size));
+  bool made =
+      check(*context, "MPI_Comm_rank", MPI_Comm_rank(from, &ranks->rank)) &&
+      check(*context, "MPI_Comm_dup",
+            MPI_Comm_dup(from, &context->communicator)) &&
+      check(
+          *context, "MPI_Comm_set_errhandler",
+          MPI_Comm_set_errhandler(context->communicator, MPI_ERRORS_RETURN)) &&
+      check(*context, "MPI_Comm_size",
+            MPI_Comm_size(context->communicator, &ranks->size));
   return made ? PIKORT_OK : PIKORT_RANK_FAILED;
 }
 
@@ -179,6 +179,9 @@ int32_t pikort_start_mpi(double seconds, pikort_ranks *ranks) {
 }
 
 void pikort_stop_mpi(pikort_ranks *ranks, int32_t fails) {
+  int started = 0;
+  if (MPI_Initialized(&started) != MPI_SUCCESS || !started)
+    return;
   if (fails)
     MPI_Abort(MPI_COMM_WORLD, 1);
   pikort_free_mpi_ranks(ranks);

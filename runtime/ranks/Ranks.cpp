@@ -24,6 +24,13 @@ int32_t Ranks::ownerOf(const Stage &stage, int64_t bin) const {
   return static_cast<int32_t>(sum % size());
 }
 
+std::vector<int32_t> Ranks::findOwners(const Stage &stage) const {
+  std::vector<int32_t> owners(static_cast<size_t>(stage.bins()));
+  for (size_t bin = 0; bin < owners.size(); ++bin)
+    owners[bin] = ownerOf(stage, static_cast<int64_t>(bin));
+  return owners;
+}
+
 void Ranks::beginRun() {
   for (Source &source : p_.sources) {
     const Stage &stage = p_.stages[source.stage];
@@ -45,6 +52,7 @@ void Ranks::filter(const Stage &stage, Items &items,
   if (stage.partition != PIKOIR_BINS)
     return;
   Array<uint32_t> owned(p_.memory, items.pairCount);
+  std::vector<int32_t> owners = findOwners(stage);
   int64_t count = 0, first = 0; // of the pairs of an item
   for (int64_t k = 0; k < items.pairCount; ++k) {
     uint32_t entry = items.pairs[k];
@@ -55,7 +63,7 @@ void Ranks::filter(const Stage &stage, Items &items,
     if (entry == noBucket)
       continue;
     uint32_t bucket = entry & ~PIKOIR_FIRST_BUCKET;
-    if (ownerOf(stage, bucket / stage.tiles) != rank())
+    if (owners[static_cast<size_t>(bucket / stage.tiles)] != rank())
       continue;
     if (owned[first] == noBucket)
       owned[first] = bucket | PIKOIR_FIRST_BUCKET;
@@ -309,6 +317,7 @@ void Ranks::exchange(Edge &edge) {
   auto n = static_cast<size_t>(this->size());
   Stream stream = takeEdge(p_, edge);
   bool placed = to.placed(), byBin = to.partition == PIKOIR_BINS;
+  std::vector<int32_t> owners = byBin ? findOwners(to) : std::vector<int32_t>();
   // Calls body(item, rank, bucket or -1, whether it is the rank's first).
   auto forTargets = [&](auto &&body) {
     std::vector<int64_t> latest(n, -1); // item that each rank has got
@@ -321,7 +330,8 @@ void Ranks::exchange(Edge &edge) {
       do {
         uint32_t bucket = stream.pairs[k++] & ~PIKOIR_FIRST_BUCKET;
         auto target = byBin
-                          ? static_cast<size_t>(ownerOf(to, bucket / to.tiles))
+                          ? static_cast<size_t>(
+                                owners[static_cast<size_t>(bucket / to.tiles)])
                           : size_t(0);
         body(i, target, int64_t(bucket), latest[target] != i);
         latest[target] = i;

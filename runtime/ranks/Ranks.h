@@ -38,6 +38,8 @@ public:
   int32_t size() const { return transport_.size; }
   /// Who runs a bin of a stage that is divided by bins.
   int32_t ownerOf(const Stage &stage, int64_t bin) const;
+  /// The same of all its bins.
+  std::vector<int32_t> findOwners(const Stage &stage) const;
   /// Whether this rank runs a bin of a stage.
   bool owns(const Stage &stage, int64_t bin) const {
     return stage.partition == PIKOIR_BINS    ? ownerOf(stage, bin) == rank()

@@ -169,6 +169,10 @@ void Ranks::shareChanges(State &state, Bytes &kept, bool toFirst) {
       std::memcpy(&i, at, 8);
       const uint8_t *changed = at + 8, *before = kept.data() + i * record;
       uint8_t *now = data + i * record;
+      if (fields_.empty()) { // no other rank has changed it
+        std::memcpy(now, changed, length);
+        continue;
+      }
       for (size_t b = 0; b < length; ++b)
         if (!isReduced[b] && changed[b] != before[b])
           now[b] = changed[b];

@@ -84,6 +84,8 @@ def main():
     parser.add_argument("--bin", default=str(ROOT / "build/bin"))
     parser.add_argument("--driver", help="in place of libcuda.so.1")
     parser.add_argument("--only", help="an example")
+    parser.add_argument("--ranks", metavar="N,...",
+                        help="not on a GPU, but divided among so many ranks in threads")
     parser.add_argument("--few", action="store_true",
                         help="every fourth pipeline of an example, in turn on one of both")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -95,6 +97,8 @@ def main():
     # Joins of few primitives are not left to one block.
     os.environ.setdefault("PIKO_CUDA_ALONE", "0")
 
+    targets_of_all = [["--ranks", ranks] for ranks in arguments.ranks.split(",")] \
+        if arguments.ranks else TARGETS
     tasks = []
     for file in sorted(ROOT.glob("examples/*/*.piko.cpp")):
         if arguments.only not in (None, file.parent.name):
@@ -117,8 +121,8 @@ def main():
                 expected = pool.submit(
                     lambda *what: draw(*what)[1], tools, folder, file, pipes[0], [])
             for pipe in pipes[::4] if arguments.few else pipes:
-                turn = len(done) % len(TARGETS)
-                targets = [TARGETS[turn]] if arguments.few else TARGETS
+                turn = len(done) % len(targets_of_all)
+                targets = [targets_of_all[turn]] if arguments.few else targets_of_all
                 done.append(pool.submit(
                     check, tools, folder, file, pipe, expected, targets))
         for future in concurrent.futures.as_completed(done):
@@ -127,7 +131,8 @@ def main():
             except Failed as failure:
                 failures += 1
                 print(failure, flush=True)
-    print(f"{len(done)} pipelines on a GPU: {failures} failed")
+    where = "divided among ranks" if arguments.ranks else "on a GPU"
+    print(f"{len(done)} pipelines {where}: {failures} failed")
     return 1 if failures else 0
 
 

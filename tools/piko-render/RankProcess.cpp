@@ -26,11 +26,12 @@ Result<Done> RankProcess::start(Options &options) {
   if (!startMPI || !stopMPI)
     return Error{"--mpi: expected a build with MPI, but there is no " +
                  std::string(PIKO_MPI_LIBRARY)};
-  if (startMPI(options.rankSeconds, &self) != PIKORT_OK)
-    return Error{std::string("--mpi: ") + (self.message
-                                               ? self.message(self.context)
-                                               : "MPI does not start")};
+  bool works = startMPI(options.rankSeconds, &self) == PIKORT_OK;
   isStarted = true;
+  if (!works)
+    return Error{
+        "--mpi: rank " + std::to_string(self.rank) + ": " +
+        (self.message ? self.message(self.context) : "MPI does not start")};
   if (self.rank == 0)
     return Done{};
   // It runs all that the first one does.

@@ -373,7 +373,7 @@ int main(int argc, char **argv) {
   if (auto ok = applyTuned(*options); !ok)
     return fail(ok.error());
   if (auto ok = rankProcess().start(*options); !ok)
-    return fail(ok.error());
+    return failRank(ok.error());
   auto ok = renderScene(*options);
   return ok ? stopRank(0) : failRank(ok.error());
 }
