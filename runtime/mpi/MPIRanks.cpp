@@ -62,17 +62,16 @@ bool wait(Context &context) {
       break;
   }
   std::string late;
-  for (size_t i = 0; i < context.requests.size(); ++i) {
+  for (size_t i = 0; i < context.peers.size(); ++i) {
     std::string peer = std::to_string(context.peers[i]);
     if (context.requests[i] != MPI_REQUEST_NULL &&
         (late.empty() || context.peers[i] != context.peers[i - 1]))
-      late += (late.empty() ? "" : ", ") + peer;
+      late += (late.empty() ? " from rank " : ", ") + peer;
   }
   char limit[32];
   std::snprintf(limit, sizeof limit, "%g", context.seconds);
   context.message = "expected all ranks to exchange what they have within " +
-                    std::string(limit) +
-                    " s, but there is no answer from rank " + late;
+                    std::string(limit) + " s, but there is no answer" + late;
   return false;
 }
 
@@ -143,15 +142,16 @@ int32_t pikort_make_mpi_ranks(const void *communicator, double seconds,
   context->seconds = seconds;
   *ranks = {0, 1, context, exchange, message};
   MPI_Comm from = *static_cast<const MPI_Comm *>(communicator);
+  context->requests.resize(1, MPI_REQUEST_NULL);
   bool made =
       check(*context, "MPI_Comm_rank", MPI_Comm_rank(from, &ranks->rank)) &&
-      check(*context, "MPI_Comm_dup",
-            MPI_Comm_dup(from, &context->communicator)) &&
-      check(
-          *context, "MPI_Comm_set_errhandler",
-          MPI_Comm_set_errhandler(context->communicator, MPI_ERRORS_RETURN)) &&
-      check(*context, "MPI_Comm_size",
-            MPI_Comm_size(context->communicator, &ranks->size));
+      check(*context, "MPI_Comm_size", MPI_Comm_size(from, &ranks->size)) &&
+      check(*context, "MPI_Comm_idup",
+            MPI_Comm_idup(from, &context->communicator,
+                          context->requests.data())) &&
+      wait(*context) &&
+      check(*context, "MPI_Comm_set_errhandler",
+            MPI_Comm_set_errhandler(context->communicator, MPI_ERRORS_RETURN));
   return made ? PIKORT_OK : PIKORT_RANK_FAILED;
 }
 

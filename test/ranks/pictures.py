@@ -22,7 +22,7 @@ def render(args, before, options):
     lines = done.stdout.splitlines()
     if len(lines) != 1:
         sys.exit(f"expected the first rank alone to print, but got: {done.stdout}")
-    return json.loads(lines[0])["hash"]
+    return json.loads(lines[0])["image_hash"]
 
 
 def check_error(args, ranks):

@@ -37,8 +37,9 @@ static bool fails() {
   return true;
 }
 
-PIKO_EXPORT int MPI_Comm_dup(MPI_Comm from, MPI_Comm *to) {
-  return fails() ? MPI_ERR_INTERN : PMPI_Comm_dup(from, to);
+PIKO_EXPORT int MPI_Comm_idup(MPI_Comm from, MPI_Comm *to,
+                              MPI_Request *request) {
+  return fails() ? MPI_ERR_INTERN : PMPI_Comm_idup(from, to, request);
 }
 PIKO_EXPORT int MPI_Comm_size(MPI_Comm communicator, int *size) {
   return fails() ? MPI_ERR_COMM : PMPI_Comm_size(communicator, size);
