@@ -178,14 +178,23 @@ int32_t pikort_start_mpi(double seconds, pikort_ranks *ranks) {
   return pikort_make_mpi_ranks(&world, seconds, ranks);
 }
 
-void pikort_stop_mpi(pikort_ranks *ranks, int32_t fails) {
+int32_t pikort_stop_mpi(pikort_ranks *ranks, int32_t fails) {
   int started = 0;
   if (MPI_Initialized(&started) != MPI_SUCCESS || !started)
-    return;
+    return PIKORT_OK;
   if (fails)
     MPI_Abort(MPI_COMM_WORLD, 1);
+  // To finalize has no limit of time.
+  auto &context = *static_cast<Context *>(ranks->context);
+  context.peers.clear();
+  context.requests.assign(1, MPI_REQUEST_NULL);
+  if (!check(context, "MPI_Ibarrier",
+             MPI_Ibarrier(context.communicator, context.requests.data())) ||
+      !wait(context))
+    return PIKORT_RANK_FAILED;
   pikort_free_mpi_ranks(ranks);
   MPI_Finalize();
+  return PIKORT_OK;
 }
 
 } // extern "C"

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <dlfcn.h>
+#include <utility>
 
 using namespace piko;
 using namespace piko::render;
@@ -21,7 +22,7 @@ Result<Done> RankProcess::start(Options &options) {
   void *library = dlopen(PIKO_MPI_LIBRARY, RTLD_NOW | RTLD_GLOBAL);
   auto startMPI = reinterpret_cast<int32_t (*)(double, pikort_ranks *)>(
       library ? dlsym(library, "pikort_start_mpi") : nullptr);
-  stopMPI = reinterpret_cast<void (*)(pikort_ranks *, int32_t)>(
+  stopMPI = reinterpret_cast<int32_t (*)(pikort_ranks *, int32_t)>(
       library ? dlsym(library, "pikort_stop_mpi") : nullptr);
   if (!startMPI || !stopMPI)
     return Error{"--mpi: expected a build with MPI, but there is no " +
@@ -43,10 +44,16 @@ Result<Done> RankProcess::start(Options &options) {
   return Done{};
 }
 
-void RankProcess::stop(bool fails) {
-  if (isStarted)
-    stopMPI(&self, fails);
-  isStarted = false;
+std::string RankProcess::stop(bool fails) {
+  bool stops = std::exchange(isStarted, false);
+  if (!stops || stopMPI(&self, fails) == PIKORT_OK)
+    return {};
+  std::string wrong =
+      "rank " + std::to_string(self.rank) + ": " + self.message(self.context);
+  std::fprintf(stderr, "piko-render: error: %s\n", wrong.c_str());
+  std::fflush(stderr);
+  stopMPI(&self, /*fails=*/true);
+  return wrong;
 }
 
 std::string render::printTraffic(pikort_pipeline *pipeline) {

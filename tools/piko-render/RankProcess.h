@@ -18,15 +18,16 @@ class RankProcess {
 public:
   /// Starts MPI if the options say so.
   Result<Done> start(Options &options);
-  /// Ends it; with `fails` all processes.
-  void stop(bool fails);
+  /// Ends it; with `fails` all processes. What is wrong if others do not come
+  /// to the end; then they have been ended.
+  std::string stop(bool fails);
   bool isOne() const { return isStarted; }
   const pikort_ranks &ranks() const { return self; }
 
 private:
   bool isStarted = false;
   pikort_ranks self{};
-  void (*stopMPI)(pikort_ranks *, int32_t) = nullptr;
+  int32_t (*stopMPI)(pikort_ranks *, int32_t) = nullptr;
 };
 
 /// The one of this process.

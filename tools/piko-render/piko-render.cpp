@@ -335,8 +335,8 @@ int fail(const Error &error) {
 }
 
 int stopRank(int status) {
-  rankProcess().stop(/*fails=*/false);
-  return status;
+  bool stops = rankProcess().stop(/*fails=*/false).empty();
+  return stops ? status : 1;
 }
 
 /// An error of a run is that of all ranks, and the first one says it. Any other

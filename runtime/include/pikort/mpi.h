@@ -29,8 +29,9 @@ PIKORT_API void pikort_free_mpi_ranks(pikort_ranks *ranks);
 
 /// Starts MPI, and makes ranks of all its processes. 0, or a status.
 PIKORT_API int32_t pikort_start_mpi(double seconds, pikort_ranks *ranks);
-/// Ends MPI: with `fails` all processes, as some may wait for this one.
-PIKORT_API void pikort_stop_mpi(pikort_ranks *ranks, int32_t fails);
+/// Ends MPI, when all have come so far: 0, or a status if some do not come in
+/// time. With `fails` it ends all processes, as some may wait for this one.
+PIKORT_API int32_t pikort_stop_mpi(pikort_ranks *ranks, int32_t fails);
 
 #ifdef __cplusplus
 } // extern "C"
