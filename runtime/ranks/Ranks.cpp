@@ -139,7 +139,8 @@ std::vector<int64_t> Ranks::meet(Going going, const std::vector<int64_t> &bytes,
   return result;
 }
 
-/// Brings a piece to each rank; gives what each has for this one.
+/// Brings a piece to each rank; gives what each has for this one. Where memory
+/// for that is refused, all hear of it before any bytes go.
 std::vector<Ranks::Bytes> Ranks::swap(const std::vector<Piece> &pieces) {
   auto n = static_cast<size_t>(size());
   std::vector<int64_t> sendBytes(n);
@@ -149,11 +150,15 @@ std::vector<Ranks::Bytes> Ranks::swap(const std::vector<Piece> &pieces) {
   std::vector<Bytes> result(n);
   std::vector<const void *> send(n);
   std::vector<void *> receive(n);
-  for (size_t r = 0; r < n; ++r) {
-    result[r] = Bytes(p_.memory, receiveBytes[r]);
-    send[r] = pieces[r].data;
-    receive[r] = result[r].data();
-  }
+  int32_t status = guarded(&p_, "pipeline", [&] {
+    for (size_t r = 0; r < n; ++r) {
+      result[r] = Bytes(p_.memory, receiveBytes[r]);
+      send[r] = pieces[r].data;
+      receive[r] = result[r].data();
+    }
+  });
+  meet(status == PIKORT_OK ? Going::On : Going::Failed,
+       std::vector<int64_t>(n));
   auto self = static_cast<size_t>(rank());
   if (sendBytes[self] > 0)
     std::memcpy(receive[self], send[self],

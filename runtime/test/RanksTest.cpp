@@ -163,6 +163,44 @@ TEST_F(Ranks, BrokenNetwork) {
   EXPECT_TRUE(pipe.run());
 }
 
+// Whenever memory is refused on one rank, it is that rank's error on all.
+TEST_F(Ranks, RefusedMemory) {
+  sum.resize(3000);
+  EXPECT_TRUE(pipe.buffer("sum", sum));
+  pikort_ranks ranks[2];
+  ASSERT_EQ(pikort_make_thread_ranks(2, ranks), PIKORT_OK);
+  ASSERT_EQ(pikort_set_ranks(pipe.get(), &ranks[0]), PIKORT_OK);
+  piko::rt::Pipeline other{program};
+  ASSERT_TRUE(other.domain({1}));
+  std::vector<int64_t> otherSum = sum, otherMost = most;
+  ASSERT_TRUE(other.source(0, items) && other.buffer("sum", otherSum) &&
+              other.buffer("most", otherMost));
+  ASSERT_EQ(pikort_set_ranks(other.get(), &ranks[1]), PIKORT_OK);
+  int refused = 0;
+  bool hasRun = false;
+  for (int64_t bytes = 4 << 10; !hasRun && bytes < (1 << 20);
+       bytes += 4 << 10) {
+    ASSERT_EQ(pikort_set_memory_limit(other.get(), bytes), PIKORT_OK);
+    int32_t status = 0;
+    std::thread thread([&] { status = pikort_run(other.get()); });
+    hasRun = pikort_run(pipe.get()) == PIKORT_OK;
+    thread.join();
+    EXPECT_EQ(hasRun, status == PIKORT_OK);
+    if (hasRun)
+      continue;
+    ++refused;
+    EXPECT_EQ(status, PIKORT_OUT_OF_MEMORY);
+    std::string message = pikort_message(pipe.get());
+    EXPECT_TRUE(message.starts_with("rank 1: ")) << message;
+    EXPECT_EQ(message, pikort_message(other.get()));
+  }
+  EXPECT_TRUE(hasRun);
+  EXPECT_GT(refused, 1);
+  ASSERT_EQ(pikort_set_ranks(pipe.get(), nullptr), PIKORT_OK);
+  ASSERT_EQ(pikort_set_ranks(other.get(), nullptr), PIKORT_OK);
+  pikort_free_thread_ranks(ranks);
+}
+
 // Who leaves is not waited for.
 TEST_F(Ranks, Leaves) {
   pikort_ranks ranks[2];
