@@ -126,64 +126,104 @@ static void combine(int32_t kind, uint8_t *now, const uint8_t *changed,
   std::memcpy(now, &a, sizeof(T));
 }
 
+namespace {
+/// Elements side by side that have changed.
+struct Run {
+  int64_t first, count;
+};
+} // namespace
+
+static std::vector<Run> findChanges(const uint8_t *now, const uint8_t *before,
+                                    int64_t elements, int64_t record) {
+  auto differ = [&](int64_t begin, int64_t end) {
+    return std::memcmp(now + begin * record, before + begin * record,
+                       static_cast<size_t>((end - begin) * record)) != 0;
+  };
+  constexpr int64_t bytesAtOnce = 4096;
+  int64_t step = std::max<int64_t>(1, bytesAtOnce / record);
+  std::vector<Run> runs;
+  for (int64_t begin = 0; begin < elements; begin += step) {
+    int64_t end = std::min(elements, begin + step);
+    if (!differ(begin, end))
+      continue;
+    for (int64_t i = begin; i < end; ++i) {
+      if (!differ(i, i + 1))
+        continue;
+      if (!runs.empty() && runs.back().first + runs.back().count == i)
+        ++runs.back().count;
+      else
+        runs.push_back({i, 1});
+    }
+  }
+  return runs;
+}
+
 void Ranks::shareChanges(State &state, Bytes &kept, bool toFirst) {
   int64_t record = p_.records[state.record].size;
   auto length = static_cast<size_t>(record);
-  int64_t elements = elementsOf(state);
+  auto bytesOf = [&](const Run &run) {
+    return static_cast<size_t>(run.count * record);
+  };
   uint8_t *data = state.view.data;
-  std::vector<uint8_t> changes; // index and record of each that has changed
-  for (int64_t i = 0; i < elements; ++i) {
-    const uint8_t *now = data + i * record;
-    if (std::memcmp(now, kept.data() + i * record, length) == 0)
-      continue;
-    size_t at = changes.size();
-    changes.resize(at + 8 + length);
-    std::memcpy(&changes[at], &i, 8);
-    std::memcpy(&changes[at + 8], now, length);
+  std::vector<Run> runs =
+      findChanges(data, kept.data(), elementsOf(state), record);
+  size_t bytes = 0;
+  for (const Run &run : runs)
+    bytes += sizeof run + bytesOf(run);
+  Bytes own(p_.memory, static_cast<int64_t>(bytes));
+  uint8_t *to = own.data();
+  for (const Run &run : runs) {
+    std::memcpy(to, &run, sizeof run);
+    std::memcpy(to + sizeof run, data + run.first * record, bytesOf(run));
+    to += sizeof run + bytesOf(run);
   }
-  Piece all{changes.data(), static_cast<int64_t>(changes.size())};
   std::vector<Piece> pieces(static_cast<size_t>(size()), {nullptr, 0});
   for (size_t r = 0; r < pieces.size(); ++r)
-    if (r == 0 || !toFirst || static_cast<int32_t>(r) == rank())
-      pieces[r] = all;
+    if (static_cast<int32_t>(r) != rank() && (r == 0 || !toFirst))
+      pieces[r] = {own.data(), static_cast<int64_t>(bytes)};
   count(state, pieces);
   std::vector<Bytes> received = swap(pieces);
   if (toFirst && rank() != 0)
     return;
+  bool combines = !fields_.empty(); // else no two ranks have changed an element
+  if (combines) {
+    // What this rank has changed has its turn, too.
+    for (const Run &run : runs)
+      std::memcpy(data + run.first * record, kept.data() + run.first * record,
+                  bytesOf(run));
+    received[static_cast<size_t>(rank())] = std::move(own);
+  }
   std::vector<bool> isReduced(length);
   for (const SharedField &field : fields_)
     for (int64_t e = 0; e < field.elements; ++e)
       for (int64_t b = 0; b < field.bytes; ++b)
         isReduced[static_cast<size_t>(field.offset + e * field.stride + b)] =
             true;
-  // What this rank has changed is one of the lists.
-  for (size_t at = 0; at < changes.size(); at += 8 + length) {
-    int64_t i;
-    std::memcpy(&i, &changes[at], 8);
-    std::memcpy(data + i * record, kept.data() + i * record, length);
-  }
-  for (const Bytes &list : received)
-    for (const uint8_t *at = list.data(), *end = at + list.size(); at < end;
-         at += 8 + length) {
-      int64_t i;
-      std::memcpy(&i, at, 8);
-      const uint8_t *changed = at + 8, *before = kept.data() + i * record;
-      uint8_t *now = data + i * record;
-      if (fields_.empty()) { // no other rank has changed it
-        std::memcpy(now, changed, length);
-        continue;
+  auto apply = [&](int64_t i, const uint8_t *changed) {
+    const uint8_t *before = kept.data() + i * record;
+    uint8_t *now = data + i * record;
+    for (size_t b = 0; b < length; ++b)
+      if (!isReduced[b] && changed[b] != before[b])
+        now[b] = changed[b];
+    for (const SharedField &field : fields_)
+      for (int64_t e = 0; e < field.elements; ++e) {
+        int64_t o = field.offset + e * field.stride;
+        if (field.bytes == 8)
+          combine<uint64_t>(field.kind, now + o, changed + o, before + o);
+        else
+          combine<uint32_t>(field.kind, now + o, changed + o, before + o);
       }
-      for (size_t b = 0; b < length; ++b)
-        if (!isReduced[b] && changed[b] != before[b])
-          now[b] = changed[b];
-      for (const SharedField &field : fields_)
-        for (int64_t e = 0; e < field.elements; ++e) {
-          int64_t o = field.offset + e * field.stride;
-          if (field.bytes == 8)
-            combine<uint64_t>(field.kind, now + o, changed + o, before + o);
-          else
-            combine<uint32_t>(field.kind, now + o, changed + o, before + o);
-        }
+  };
+  for (const Bytes &list : received)
+    for (const uint8_t *at = list.data(), *end = at + list.size(); at < end;) {
+      Run run;
+      std::memcpy(&run, at, sizeof run);
+      at += sizeof run;
+      if (!combines)
+        std::memcpy(data + run.first * record, at, bytesOf(run));
+      for (int64_t i = 0; combines && i < run.count; ++i)
+        apply(run.first + i, at + i * record);
+      at += bytesOf(run);
     }
 }
 
