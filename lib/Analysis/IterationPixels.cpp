@@ -84,6 +84,36 @@ static std::optional<Division> matchDivision(Operation *op, Value of) {
   return std::nullopt;
 }
 
+namespace {
+
+/// The pixels that iterations of a loop access.
+class IterationPixels {
+public:
+  explicit IterationPixels(Operation *loop)
+      : loop(loop), counters(loop->getRegion(0).getArguments()) {}
+
+  /// Whether coordinates say which iteration it is: each counter is one of them
+  /// but for casts and for what is the same in all iterations, or they hold its
+  /// quotient and its remainder.
+  bool areOwn(ValueRange coordinates) const;
+  /// The one iteration that reaches an operation, or null: a test of its number
+  /// stands around it.
+  Value findOnly(Operation *op) const;
+  /// Whether an iteration updates the same pixel twice, or it is one and the
+  /// same iteration that reaches both updates.
+  bool agree(UpdateOp a, UpdateOp b) const;
+
+private:
+  bool isInvariant(Value value) const;
+  Value getRoot(Value value) const;
+  bool determine(ArrayRef<Value> roots, Value value, int depth = 0) const;
+
+  Operation *loop;
+  ValueRange counters;
+};
+
+} // namespace
+
 bool IterationPixels::isInvariant(Value value) const {
   return !loop->isAncestor(value.getParentBlock()->getParentOp()) ||
          getConstant(value);
@@ -167,16 +197,15 @@ Value IterationPixels::findOnly(Operation *op) const {
   return {};
 }
 
-bool IterationPixels::agree(Operation *a, ValueRange pixelOfA, Operation *b,
-                            ValueRange pixelOfB) const {
+bool IterationPixels::agree(UpdateOp a, UpdateOp b) const {
   Value onlyOfA = findOnly(a), onlyOfB = findOnly(b);
   if (onlyOfA || onlyOfB)
     return onlyOfA && onlyOfB && isSame(onlyOfA, onlyOfB);
-  return llvm::equal(pixelOfA, pixelOfB);
+  return llvm::equal(a.getCoordinates(), b.getCoordinates());
 }
 
 bool piko::updatesOwnPixels(Operation *loop) {
-  IterationPixels pixels(loop, loop->getRegion(0).getArguments());
+  IterationPixels pixels(loop);
   llvm::StringMap<UpdateOp> known; // by image
   WalkResult result =
       loop->walk([&](StateAccessOpInterface access) -> WalkResult {
@@ -186,12 +215,10 @@ bool piko::updatesOwnPixels(Operation *loop) {
         if (!update)
           return WalkResult::interrupt(); // of a pixel that is not known
         auto [it, isFirst] = known.try_emplace(update.getImage(), update);
-        UpdateOp first = it->second;
         return WalkResult(
             success(isFirst ? pixels.findOnly(update) ||
                                   pixels.areOwn(update.getCoordinates())
-                            : pixels.agree(first, first.getCoordinates(),
-                                           update, update.getCoordinates())));
+                            : pixels.agree(it->second, update)));
       });
   return !result.wasInterrupted();
 }

@@ -368,6 +368,12 @@ void endClears(pikort_pipeline &p);
 
 /// Makes room for what will be gathered from a kernel, once it has units.
 void prepareOutputs(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
+/// Gives the slots of a stage that collects names that all ranks know.
+void nameSlots(pikort_pipeline &p, const Stage &stage, Kernel &kernel);
+/// The same of a stage that runs in the kernel of another one, by that one's
+/// bins.
+void nameLocalSlots(pikort_pipeline &p, const Kernel &host, Kernel &kernel,
+                    int64_t slots);
 
 } // namespace piko::rt
 

@@ -18,21 +18,6 @@ using namespace piko::rt;
 
 static constexpr int64_t leastBytes = int64_t(16) << 10;
 
-/// A slot is named by its bin in the host's kernel.
-static void nameSlots(pikort_pipeline &p, const Kernel &host, Kernel &kernel,
-                      int64_t slots) {
-  kernel.slotNames = Array<uint64_t>(p.memory, slots);
-  int64_t slot = 0;
-  uint64_t previous = UINT64_MAX;
-  for (const pikoir_unit &unit : host.units)
-    for (int64_t i = unit.bucket_begin; i < unit.bucket_end; ++i) {
-      auto bin = static_cast<uint64_t>(host.calls ? host.calls[i].bin : i);
-      kernel.slotNames[slot] =
-          previous >> 32 == bin && slot > 0 ? previous + 1 : bin << 32;
-      previous = kernel.slotNames[slot++];
-    }
-}
-
 static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
   Kernel &kernel = kernelOf(p, stage);
   kernel.clear();
@@ -44,7 +29,7 @@ static void beginLocal(pikort_pipeline &p, const Kernel &host, int32_t stage) {
     slots += bins;
   }
   if (p.stages[stage].partition == PIKOIR_BINS)
-    nameSlots(p, host, kernel, slots);
+    nameLocalSlots(p, host, kernel, slots);
   prepareOutputs(p, p.stages[stage], kernel);
   prepareLanes(p, kernel);
   kernel.open = true;

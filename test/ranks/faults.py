@@ -49,6 +49,7 @@ def main():
         sys.exit("without faults: " + good.stderr)
     failed = 0
     for kind in args.kinds.split(","):
+        before = failed
         for number in range(1, args.most + 1, args.step):
             fault = f"{args.ranks - 1}:{number}:{kind}"
             try:
@@ -61,6 +62,8 @@ def main():
             if problem:
                 sys.exit(f"{fault}: {problem}:\n{done.stdout}{done.stderr}")
             failed += 1
+        if failed == before:
+            sys.exit(f"{kind}: expected a run whose calls fail, but all end well")
     print(f"{failed} faults, each of which has ended all ranks")
 
 

@@ -86,7 +86,7 @@ Json reportStages(pikort_pipeline *pipeline, double runs) {
   return stages;
 }
 
-/// The parts of a mean frame, which sum to ms_mean.
+/// What each rank has sent in a mean frame, and held at most.
 Json reportRanks(pikort_pipeline *pipeline, double runs) {
   Json ranks = Json::array();
   for (int32_t rank = 0; rank < pikort_rank_count(pipeline); ++rank) {
@@ -99,6 +99,7 @@ Json reportRanks(pikort_pipeline *pipeline, double runs) {
   return ranks;
 }
 
+/// The parts of a mean frame, which sum to ms_mean.
 Json reportTime(pikort_pipeline *pipeline, double runs) {
   pikort_time_stats stats{};
   pikort_get_time_stats(pipeline, &stats);

@@ -10,39 +10,9 @@
 
 namespace piko {
 
-/// Of a loop that keeps its text meanwhile, and what counts its iterations:
-/// numbers that 32 bits hold.
-class IterationPixels {
-public:
-  IterationPixels(mlir::Operation *loop, mlir::ValueRange counters)
-      : loop(loop), counters(counters.begin(), counters.end()) {}
-
-  /// Whether coordinates say which iteration it is, so that no two iterations
-  /// have one pixel: each counter is one of them but for casts and for what is
-  /// the same in all iterations, or they hold its quotient and its remainder.
-  bool areOwn(mlir::ValueRange coordinates) const;
-
-  /// The one iteration that reaches an operation in the loop, or null: a test
-  /// of its number stands around it.
-  mlir::Value findOnly(mlir::Operation *op) const;
-
-  /// Whether what two operations access may be one pixel in one iteration
-  /// alone, if that holds for `a`.
-  bool agree(mlir::Operation *a, mlir::ValueRange pixelOfA, mlir::Operation *b,
-             mlir::ValueRange pixelOfB) const;
-
-private:
-  bool isInvariant(mlir::Value value) const;
-  mlir::Value getRoot(mlir::Value value) const;
-  bool determine(llvm::ArrayRef<mlir::Value> roots, mlir::Value value,
-                 int depth = 0) const;
-
-  mlir::Operation *loop;
-  llvm::SmallVector<mlir::Value, 2> counters;
-};
-
 /// Whether no two iterations of a parallel loop, or primitives of work, update
-/// one pixel.
+/// one pixel: its coordinates say which iteration it is, or only one iteration
+/// does. Numbers of iterations fit in 32 bits.
 bool updatesOwnPixels(mlir::Operation *loop);
 
 } // namespace piko

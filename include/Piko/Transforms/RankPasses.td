@@ -20,8 +20,8 @@ def PartitionProgram : Pass<"piko-partition-program", "::piko::PipelineOp"> {
     becomes a `piko.exchange`; where the bins of both ends are the same there is none.
     Primitives that are exchanged get lineage keys, and so does what leads to them.
     State that a kernel uses and others have written is brought together before
-    (`piko.keep`, `piko.share`), and what is left at the end goes to the first rank. A
-    `piko.strips` is taken apart where its stages exchange something.
+    (`piko.keep`, `piko.share`), and what is left at the end goes to the first rank. Each
+    `piko.strips` is taken apart, as ranks meet between the launches of a strip.
 
     **Guarantees** that each bin takes what it did, in the same order, for any number
     of ranks, and that all ranks run the same exchanges in the same order.

@@ -243,7 +243,7 @@ public:
     if (edge_.keyed()) {
       isShared_ = from_.collects() && from_.partition != PIKOIR_FIRST_RANK;
       if (isShared_ && !kernel_.slotNames)
-        nameSlots();
+        nameSlots(p_, from_, kernel_);
       stream_.keys.width =
           from_.collects() ? 2 + isShared_ : kernel_.keys.width + 1;
       stream_.keys.words =
@@ -272,33 +272,6 @@ private:
     } else {
       stream_.itemStorage = Array<uint8_t>(p_.memory, stream_.count * size_);
       stream_.items = stream_.itemStorage.data();
-    }
-  }
-
-  /// Other ranks run what is between these, so that a slot's rank here says
-  /// nothing there. Parts of a source are in the order of ranks.
-  void nameSlots() {
-    kernel_.slotNames = Array<uint64_t>(p_.memory, kernel_.slots());
-    if (from_.partition == PIKOIR_PARTS) {
-      auto part = static_cast<uint64_t>(p_.ranks ? p_.ranks->rank() : 0) << 32;
-      for (int64_t i = 0; i < kernel_.slots(); ++i)
-        kernel_.slotNames[i] = part + static_cast<uint64_t>(rankOf(i));
-      return;
-    }
-    for (int64_t bin = 0; bin < from_.bins() && !kernel_.calls; ++bin) {
-      int64_t begin = kernel_.offsets[bin * from_.tiles],
-              end = kernel_.offsets[(bin + 1) * from_.tiles];
-      for (int64_t i = begin; i < end; ++i)
-        kernel_.slotNames[i] =
-            (uint64_t(bin) << 32) + static_cast<uint64_t>(rankOf(i) - begin);
-    }
-    uint64_t number = 0;
-    for (int64_t i = 0; i < kernel_.calls.size(); ++i) {
-      auto bin = static_cast<uint64_t>(kernel_.calls[i].bin);
-      number = i > 0 && kernel_.calls[i - 1].bin == kernel_.calls[i].bin
-                   ? number + 1
-                   : bin << 32;
-      kernel_.slotNames[i] = number;
     }
   }
 
