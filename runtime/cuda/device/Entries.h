@@ -129,20 +129,6 @@ private:
   int64_t last_ = -1;
 };
 
-/// Copies a record.
-inline void copyRecord(uint8_t *to, const uint8_t *from, int64_t size) {
-  if (((reinterpret_cast<uint64_t>(to) | reinterpret_cast<uint64_t>(from) |
-        static_cast<uint64_t>(size)) &
-       3) == 0) {
-    for (int64_t i = 0; i < size / 4; ++i)
-      reinterpret_cast<uint32_t *>(to)[i] =
-          reinterpret_cast<const uint32_t *>(from)[i];
-    return;
-  }
-  for (int64_t i = 0; i < size; ++i)
-    to[i] = from[i];
-}
-
 } // namespace piko::cuda
 
 #endif // PIKO_RUNTIME_CUDA_DEVICE_ENTRIES_H

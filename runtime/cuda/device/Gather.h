@@ -5,15 +5,17 @@
 //   1. count    what it has, and, where the order of positions is another one,
 //               what each slot has;
 //   2. scan     gives each span, and each slot, its place;
-//   3. place    copies records and buckets there, with keys where they are
-//   asked
-//               for.
+//   3. place    copies buckets there, with keys where they are asked for, and
+//               says where records are;
+//   4. copy     where spans have many records, warps bring those: a thread
+//               alone would wait for one after the other.
 //
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKO_RUNTIME_CUDA_DEVICE_GATHER_H
 #define PIKO_RUNTIME_CUDA_DEVICE_GATHER_H
 
+#include "cuda/device/Records.h"
 #include "cuda/device/Siblings.h"
 
 namespace piko::cuda {
@@ -38,6 +40,10 @@ public:
   const Lineage &lineage() const { return lineage_; }
 
 private:
+  /// As many records of a span, in the mean, its thread copies itself: that
+  /// takes no further barrier.
+  static constexpr int64_t mostOfSpan = 2;
+
   struct Counter;
   struct SlotCounter;
   struct Placer;
@@ -105,6 +111,7 @@ struct Gather::SlotCounter {
 struct Gather::Placer {
   const Gather &gather;
   uint8_t *items;
+  const uint8_t **sources; ///< Of items, where warps copy them.
   uint32_t *pairs, *pairStarts;
   uint64_t *keys;
   uint32_t record, pair, ordinal; ///< Those before, in the order of emission.
@@ -125,7 +132,9 @@ struct Gather::Placer {
         toPair = gather.pairPlaces_.starts[rank] +
                  (toPair - gather.pairPlaces_.emitted[slot]);
     }
-    if (entry)
+    if (sources)
+      sources[to] = payload(entry);
+    else if (entry)
       copyRecord(items + to * gather.shape_.recordSize, payload(entry),
                  gather.shape_.recordSize);
     if (pairs) {
@@ -235,11 +244,15 @@ inline void Gather::findSlots() {
 
 inline void Gather::place(Stream &stream) {
   uint8_t *items = nullptr;
+  const uint8_t **sources = nullptr;
   uint32_t *pairs = nullptr, *pairStarts = nullptr;
   uint64_t *keys = nullptr;
-  if (!input_.isSource)
-    stream.items = items =
-        grid_.take<uint8_t>(recordCount_ * shape_.recordSize);
+  int64_t size = shape_.recordSize;
+  if (!input_.isSource) {
+    stream.items = items = grid_.take<uint8_t>(recordCount_ * size);
+    if (isCopiedByWarps(size) && recordCount_ > mostOfSpan * spans_.count)
+      sources = grid_.take<const uint8_t *>(recordCount_);
+  }
   if (shape_.placed) {
     stream.pairs = pairs = grid_.take<uint32_t>(pairCount_);
     stream.pairStarts = pairStarts = grid_.take<uint32_t>(recordCount_ + 1);
@@ -261,6 +274,7 @@ inline void Gather::place(Stream &stream) {
   grid_.forEach(spans_.count, [&](int64_t s) {
     Placer placer{*this,
                   items,
+                  sources,
                   pairs,
                   pairStarts,
                   keys,
@@ -269,6 +283,13 @@ inline void Gather::place(Stream &stream) {
                   all ? all[s] : 0,
                   slots ? slots[s] : 0};
     read(placer, s);
+  });
+  grid_.sync();
+  if (!sources)
+    return;
+  grid_.forEachByWarps(recordCount_, [&](int64_t i) {
+    copyRecords(items + i * size, i < recordCount_ ? sources[i] : nullptr,
+                size);
   });
   grid_.sync();
 }

@@ -67,6 +67,12 @@ public:
     for (int64_t i = index(); i < n; i += size())
       body(i);
   }
+  /// The same by whole warps, which come to body(i) together; its last numbers
+  /// may be n and above.
+  template <class Body> void forEachByWarps(int64_t n, const Body &body) const {
+    for (int64_t i = index(); i - lane() < n; i += size())
+      body(i);
+  }
 
   /// A barrier of all that work: what was written before it is seen
   /// behind.

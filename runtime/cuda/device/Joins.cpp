@@ -169,7 +169,7 @@ private:
     kernel.input = {stream.items, bins.positions, bins.order,
                     bins.offsets, cutter.units,   cutter.unitCount,
                     args_.tiles,  cutter.calls,   cutter.callCount,
-                    clears_,      nullptr};
+                    clears_,      nullptr,        0};
     kernel.log = args_.frame->log;
     kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = units;

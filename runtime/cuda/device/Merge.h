@@ -10,7 +10,7 @@
 #define PIKO_RUNTIME_CUDA_DEVICE_MERGE_H
 
 #include "common/JoinRules.h"
-#include "cuda/device/Entries.h"
+#include "cuda/device/Records.h"
 
 namespace piko::cuda {
 

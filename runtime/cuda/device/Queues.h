@@ -100,8 +100,8 @@ private:
   void copy(const Chunk &chunk, int64_t item, int64_t pair) {
     const Stream &from = chunk.stream;
     int64_t size = shape_.recordSize;
+    copyBytes(grid_, items_ + item * size, from.items, from.count * size);
     grid_.forEach(from.count, [&](int64_t i) {
-      copyRecord(items_ + (item + i) * size, from.items + i * size, size);
       for (int32_t w = 0; w < keyWidth_; ++w)
         keys_[(item + i) * keyWidth_ + w] = from.keys.word(i, w);
       if (pairStarts_)

@@ -373,7 +373,7 @@ inline void Stack::publish(FrameState &frame) {
     offsets[bucket] = 0;
     offsets[bucket + 1] = 1;
     kernel.input = {top.item,     1,       nullptr, offsets, &state_.unit, 1,
-                    member.tiles, nullptr, 0,       0,       nullptr};
+                    member.tiles, nullptr, 0,       0,       nullptr,      0};
     kernel.log = frame.log;
     kernel.log.cursor = kernel.logBegin = grid_.top();
     kernel.log.units = reinterpret_cast<int64_t>(&state_.unitLog);
