@@ -13,6 +13,8 @@
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 #include "Vectorize/Analysis/Lanes.h"
 
+#include "Piko/Analysis/Expectations.h"
+
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Transforms/Passes.h"
 
@@ -77,25 +79,17 @@ static Value dropConversions(Value index) {
   return index;
 }
 
-static int64_t countOperations(Region &region) {
-  int64_t count = 0;
-  region.walk([&](Operation *) { ++count; });
-  return count;
-}
-
 /// Whether an operation is on a side of a condition that is hardly ever taken:
 /// one that does much more than the other, which does something, too.
 static bool isRare(Operation *op, scf::ForOp loop) {
-  constexpr int64_t trivial = 16, ratio = 2;
   for (; op->getParentOp() != loop; op = op->getParentOp()) {
     auto choice = dyn_cast<scf::IfOp>(op->getParentOp());
     if (!choice || choice.getElseRegion().empty())
       continue;
     Region *side = op->getParentRegion();
-    int64_t other = countOperations(side == &choice.getThenRegion()
-                                        ? choice.getElseRegion()
-                                        : choice.getThenRegion());
-    if (other > trivial && countOperations(*side) > ratio * other)
+    if (isMuchLonger(*side, side == &choice.getThenRegion()
+                                ? choice.getElseRegion()
+                                : choice.getThenRegion()))
       return true;
   }
   return false;

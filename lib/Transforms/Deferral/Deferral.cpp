@@ -4,6 +4,7 @@
 #include "Deferral/SplitUpdate.h"
 #include "Support/StateAccess.h"
 
+#include "Piko/Analysis/Expectations.h"
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
@@ -137,31 +138,32 @@ bool Deferral::isOfItem(LoadOp load) const {
 }
 
 /// About how many instructions an operation is, by its kind.
-static int64_t getCost(Operation *op) {
+static double getCost(Operation *op) {
   if (isa<arith::DivFOp, math::SqrtOp>(op))
     return 8;
   if (op->getDialect()->getNamespace() == "math" &&
       !isa<math::AbsFOp, math::FmaOp>(op))
     return 20;
-  int64_t cost = op->getNumRegions() == 0;
+  double cost = op->getNumRegions() == 0;
   for (Region &region : op->getRegions())
     for (Operation &inner : region.getOps())
       cost += getCost(&inner);
-  constexpr int64_t iterations = 16;
-  return isa<LoopLikeOpInterface>(op) ? iterations * cost : cost;
+  return isa<LoopLikeOpInterface>(op)
+             ? cost * getExpectedIterations(op).value_or(expected::iterations)
+             : cost;
 }
 
 /// Whether computing for each pixel takes longer than keeping so many numbers.
 static bool isWorthwhile(ArrayRef<Operation *> ops, int64_t numbers,
                          Deferral::To to) {
-  int64_t cost = 0;
+  double cost = 0;
   for (Operation *op : ops)
     cost += getCost(op);
   // What is stored and read again for a number, in the second level or beyond;
   // and a pixel's iteration of the loop.
   bool isNear = to == Deferral::To::Bin;
   int64_t perNumber = isNear ? 6 : 12, perPixel = isNear ? 64 : 96;
-  return cost > perPixel + perNumber * numbers;
+  return cost > double(perPixel + perNumber * numbers);
 }
 
 CommonSlice::Rules Deferral::makeRules() {

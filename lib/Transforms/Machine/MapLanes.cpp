@@ -6,6 +6,8 @@
 //   2. find what rules a mapping out;
 //   3. take what the stage's schedule says, or what costs least.
 
+#include "Piko/Analysis/Expectations.h"
+#include "Piko/Analysis/TargetModel.h"
 #include "Piko/Analysis/Uniformity.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
 #include "Piko/Transforms/Passes.h"
@@ -27,16 +29,13 @@ using namespace piko;
 //===----------------------------------------------------------------------===//
 
 /// A warp of a GPU; two vectors of a CPU with AVX-512.
-constexpr int64_t lanes = 32;
+constexpr int64_t lanes = warpSize;
 /// To find the primitive of a pair: the five steps of a scan over 32 counts,
 /// and the five of a search in them.
 constexpr int64_t pairCost = 10;
 /// To put an update after those of the same pixel in lanes in front: a
 /// comparison with each of them, 16 on average.
 constexpr int64_t orderCost = lanes / 2;
-/// Where nothing is known: as many iterations as a bin of 8 x 8 has pixels, or
-/// as a bin of 64 x 64 has in a row.
-constexpr int64_t typicalIterations = 64, typicalExtent = 64;
 
 namespace {
 
@@ -116,14 +115,11 @@ static bool mayShareLanes(Operation *op) {
          });
 }
 
-/// As how many operations one in a loop counts whose iterations are not known.
-static constexpr int64_t weightInLoop = 8;
-
 /// How often an operation is taken to run each time that `root` does.
 static int64_t getTimes(Operation *op, Operation *root) {
   for (Operation *at = op->getParentOp(); at != root; at = at->getParentOp())
     if (isa<LoopLikeOpInterface, ParallelLoopOpInterface>(at))
-      return weightInLoop;
+      return expected::iterations;
   return 1;
 }
 
@@ -187,18 +183,18 @@ void LaneWork::countIterations(LaneLoop &entry, const Uniformity &uniformity) {
   if (auto loop = dyn_cast<ParallelForOp>(entry.loop)) {
     std::optional<int64_t> count = known(loop.getCount());
     entry.isKnown = count.has_value();
-    entry.most = std::max<int64_t>(0, count.value_or(typicalIterations));
-    // A count that differs is taken to be a quarter of the largest: as often
-    // one sees a few long ones and many short ones as all alike.
+    entry.most =
+        std::max<int64_t>(0, count.value_or(expected::parallelIterations));
     bool differs = !count && !uniformity.isSameForBin(loop.getCount());
-    entry.expected = differs ? entry.most / 4 : entry.most;
+    entry.expected =
+        differs ? entry.most / expected::longestToMean : entry.most;
     return;
   }
   auto pixels = dyn_cast<ParallelPixelsOp>(entry.loop);
   if (!pixels) { // another loop of which only the interface is known
     entry.isKnown = false;
-    entry.most = typicalIterations;
-    entry.expected = typicalIterations / 4;
+    entry.most = expected::parallelIterations;
+    entry.expected = entry.most / expected::longestToMean;
     return;
   }
   StageOp stage = getKernelStage(work);
@@ -212,7 +208,7 @@ void LaneWork::countIterations(LaneLoop &entry, const Uniformity &uniformity) {
     entry.isKnown = false;
     int64_t extent = stage.getBins()[dim];
     if (!extent)
-      extent = typicalExtent;
+      extent = expected::binExtent;
     bool differs = !uniformity.isSameForBin(lo) || !uniformity.isSameForBin(hi);
     entry.most *= extent;
     // The distance of two random points of a bin.

@@ -26,6 +26,7 @@
 #include "PikoToGPU/Mapping/SetupSplit.h"
 #include "PikoToGPU/PikoToGPU.h"
 
+#include "Piko/Analysis/Expectations.h"
 #include "Piko/Analysis/IterationPixels.h"
 #include "Piko/Conversion/UnitOrder.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
@@ -169,12 +170,13 @@ bool ThreadMapper::mapPixels() {
 /// From how many primitives on a block is done sooner if each of its threads
 /// has some, be one of them as large as any: by operations.
 int64_t ThreadMapper::countFewest(ItemsOp work) {
-  constexpr int64_t likely = 256, barriers = 200;
+  constexpr int64_t barriers = 200;
   int64_t around = 0, each = 0, most = 1;
   work->walk([&](Operation *op) {
     (op->getParentOfType<ParallelLoopOpInterface>() ? each : around) += 1;
     if (auto loop = dyn_cast<ParallelLoopOpInterface>(op))
-      most = std::max(most, std::min(likely, getMostIterations(loop)));
+      most = std::max(
+          most, std::min(expected::longestIterations, getMostIterations(loop)));
   });
   int64_t alone = around + each * most;
   int64_t shared =

@@ -9,6 +9,7 @@
 
 #include "Vectorize/Analysis/IterationLanes.h"
 
+#include "Piko/Analysis/Expectations.h"
 #include "Piko/Analysis/Uniformity.h"
 
 #include "mlir/Dialect/Arith/IR/Arith.h"
@@ -61,14 +62,11 @@ void piko::readAllElements(scf::ForOp root) {
 
 /// How often loops inside of a root come to an operation; 1 if it is in none.
 static double countIterationsAround(Operation *op, scf::ForOp root) {
-  constexpr double likely = 4;
   double iterations = 1;
   for (Operation *at = op->getParentOp(); at != root; at = at->getParentOp())
-    if (auto counted = dyn_cast<scf::ForOp>(at))
+    if (isa<scf::ForOp, scf::WhileOp>(at))
       iterations *=
-          double(getConstantIterations(counted).value_or(int64_t(likely)));
-    else if (isa<scf::WhileOp>(at))
-      iterations *= likely;
+          getExpectedIterations(at).value_or(expected::differingIterations);
   return iterations;
 }
 

@@ -517,21 +517,6 @@ bool LaneForms::isPrivateRow(Operation *op) const {
                        [&](Value element) { return isVarying(element); });
 }
 
-std::optional<int64_t> piko::getConstantIterations(scf::ForOp loop) {
-  if (std::optional<APInt> count = loop.getStaticTripCount())
-    return count->getLimitedValue();
-  auto strip = [](Value value) {
-    while (auto cast = value.getDefiningOp<arith::IndexCastOp>())
-      value = cast.getIn();
-    return value;
-  };
-  auto sum = strip(loop.getUpperBound()).getDefiningOp<arith::AddIOp>();
-  if (!sum || !matchPattern(loop.getStep(), m_One()) ||
-      strip(sum.getLhs()) != strip(loop.getLowerBound()))
-    return std::nullopt;
-  return getConstantIntValue(sum.getRhs());
-}
-
 //===----------------------------------------------------------------------===//
 // Rows with ends
 //===----------------------------------------------------------------------===//

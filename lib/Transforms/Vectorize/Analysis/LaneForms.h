@@ -106,10 +106,6 @@ private:
   llvm::DenseMap<mlir::Operation *, llvm::SmallVector<mlir::scf::ForOp>> nests;
 };
 
-/// How often a loop iterates each time, if that is known, but for sums that
-/// wrap.
-std::optional<int64_t> getConstantIterations(mlir::scf::ForOp loop);
-
 /// Whether a side of a condition has the loops of the other one with tests that
 /// may fail, for indices that are not all inside.
 bool isFallback(mlir::Region &region);

@@ -3,15 +3,13 @@
 #include "Vectorize/Cost/BranchFrequency.h"
 
 #include "Piko/Analysis/BranchProbability.h"
+#include "Piko/Analysis/Expectations.h"
 #include "Vectorize/Analysis/IterationLanes.h"
 
 #include "mlir/Interfaces/LoopLikeInterface.h"
 
 using namespace mlir;
 using namespace piko;
-
-/// Operations of a side that does next to nothing.
-static constexpr int64_t trivial = 16;
 
 bool piko::fails(Region &region) {
   return !region.empty() && llvm::any_of(region.front(), [](Operation &op) {
@@ -49,24 +47,18 @@ bool piko::isFallback(Region &region) {
   return choice && isFallbackOf(region, getOtherSide(choice, region));
 }
 
-bool piko::doesNextToNothing(Region &side) {
-  return side.empty() || countOperations(side) <= trivial;
-}
-
 Frequency piko::getFrequency(Region &side, Region &other, int64_t laneCount) {
-  constexpr double rare = 0.001;
+  Frequency rare{expected::rareSide, expected::rareSide * double(laneCount)};
   if (isFallbackOf(side, other))
-    return {rare, rare * double(laneCount)};
+    return rare;
   if (!other.empty() && isFallbackOf(other, side))
     return {1, 1};
-  constexpr int64_t ratio = 2;
-  int64_t count = countOperations(side),
-          countOther = other.empty() ? 0 : countOperations(other);
-  if (countOther > trivial && count > ratio * countOther)
-    return {rare, rare * double(laneCount)};
-  if (countOther <= trivial || countOther > ratio * count)
-    return {0.8, 1};
-  return {0.5, 1};
+  if (isMuchLonger(side, other))
+    return rare;
+  bool isUsual =
+      doesNextToNothing(other) ||
+      countOperations(other) > expected::rareToUsual * countOperations(side);
+  return {isUsual ? expected::loneSide : expected::eitherSide, 1};
 }
 
 bool piko::isNextGuard(scf::IfOp choice) {
@@ -82,7 +74,7 @@ static bool goesOnAfter(Operation *op, Operation *loop) {
     int64_t after = 0;
     for (Operation *at = op->getNextNode(); at; at = at->getNextNode())
       after += countOperations(at);
-    if (after > trivial)
+    if (after > expected::fewOperations)
       return true;
   }
   return false;
@@ -90,6 +82,6 @@ static bool goesOnAfter(Operation *op, Operation *loop) {
 
 bool piko::mayBeSlowPath(scf::IfOp choice, Region &side, Operation *loop) {
   Region &other = getOtherSide(choice, side);
-  return hasLoop(side) && !other.empty() && countOperations(other) <= trivial &&
+  return hasLoop(side) && !other.empty() && doesNextToNothing(other) &&
          goesOnAfter(choice, loop);
 }

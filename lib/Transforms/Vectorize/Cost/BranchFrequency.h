@@ -29,9 +29,6 @@ struct Frequency {
 /// Whether a program that is right does not come here.
 bool fails(mlir::Region &region);
 
-/// Whether a side of a condition has no more than a few operations.
-bool doesNextToNothing(mlir::Region &side);
-
 /// How often a side of a condition runs, where lanes differ: mostly, if it
 /// stands alone; hardly ever, if it does much more than the other, which does
 /// something, too.

@@ -14,6 +14,7 @@
 #include "Vectorize/Cost/LaneCycles.h"
 
 #include "Piko/Analysis/BranchProbability.h"
+#include "Piko/Analysis/Expectations.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -27,12 +28,6 @@ using namespace piko;
 
 /// How many operations test whether an index is linear.
 static constexpr double rowTest = 5;
-
-/// How often a loop iterates.
-static constexpr double loopIterations = 8, iterationsThatDiffer = 4;
-
-/// How many lanes are at work in a loop that each goes through by itself.
-static constexpr double fullness = 0.85;
 
 namespace {
 
@@ -145,14 +140,15 @@ double CostModel::getIterations(Operation *loop) const {
   if (auto counted = dyn_cast<scf::ForOp>(loop))
     if (std::optional<int64_t> count = getConstantIterations(counted))
       return double(*count);
-  return lanes.isSharedLoop(loop) ? loopIterations : iterationsThatDiffer;
+  return lanes.isSharedLoop(loop) ? expected::iterations
+                                  : expected::differingIterations;
 }
 
 double CostModel::getGoing(Operation *loop) const {
   if (lanes.isSharedLoop(loop))
     return 1;
   if (loop->hasAttr(marks::iterations))
-    return fullness;
+    return expected::fullness;
   if (auto counted = dyn_cast<scf::ForOp>(loop);
       counted && getConstantIterations(counted))
     return 1;
@@ -170,7 +166,7 @@ double CostModel::getFlatIterations(Operation *outer, Operation *inner) const {
   // Measured, of lists and of searches.
   constexpr double goOnInNest = 0.35;
   return getIterations(outer) *
-         std::max(1.0, getIterations(inner) * goOnInNest) / fullness;
+         std::max(1.0, getIterations(inner) * goOnInNest) / expected::fullness;
 }
 
 double CostModel::getOwnIterations(Operation *loop) const {
@@ -257,8 +253,8 @@ void CostModel::addStructure(Operation *op, Frequency times, bool laneByLane) {
   if (!laneByLane && loop && !lanes.getNest(loop).empty()) {
     Frequency full;
     for (size_t i = 0, e = lanes.getNest(loop).size(); i < e; ++i)
-      full.serial *=
-          iterationsThatDiffer * (i == 0 ? cycles.goOn : cycles.goOnInside);
+      full.serial *= expected::differingIterations *
+                     (i == 0 ? cycles.goOn : cycles.goOnInside);
     cost.vectors += cycles.pairs * times.vectors * full.serial;
     add(lanes.getNest(loop).back().getRegion(),
         times.scaled(full.serial, full.serial), laneByLane);

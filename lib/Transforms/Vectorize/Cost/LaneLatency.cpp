@@ -8,6 +8,7 @@
 #include "Vectorize/Cost/LaneLatency.h"
 
 #include "Piko/Analysis/BranchProbability.h"
+#include "Piko/Analysis/Expectations.h"
 #include "Piko/Dialect/Piko/IR/PikoApproximation.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -72,13 +73,9 @@ private:
 } // namespace
 
 static double countIterations(Operation *loop) {
-  constexpr double likely = 8;
-  auto counted = dyn_cast<scf::ForOp>(loop);
-  std::optional<int64_t> iterations =
-      counted ? getConstantIterations(counted) : std::nullopt;
-  return iterations
-             ? double(*iterations)
-             : std::max(1.0, getProbableIterations(loop).value_or(likely));
+  double iterations =
+      getExpectedIterations(loop).value_or(expected::iterations);
+  return isa<scf::ForOp>(loop) ? iterations : std::max(1.0, iterations);
 }
 
 /// Whether a number is only where rows begin, of which the first lane's is kept

@@ -27,6 +27,7 @@
 #include "Vectorize/Shape/FlattenLoops.h"
 #include "Vectorize/Shape/MergeLoops.h"
 
+#include "Piko/Analysis/Expectations.h"
 #include "Piko/Dialect/Piko/IR/Marks.h"
 #include "Piko/Dialect/Piko/IR/PikoCPU.h"
 
@@ -260,7 +261,7 @@ static void flattenIterations(FlatLoop &best, const IterationLanes &lanes) {
     loop.erase();
     return;
   }
-  constexpr double fullness = 0.85, atOnce = 3.0 / 8;
+  constexpr double atOnce = 3.0 / 8;
   double iterations = before.getOwnIterations(inner);
   Location loc = loop.getLoc();
   SmallVector<Value> writers = takeWriters(loop);
@@ -273,7 +274,7 @@ static void flattenIterations(FlatLoop &best, const IterationLanes &lanes) {
     return;
   }
   nest.advances = std::min(1.0, 1 / (iterations * atOnce));
-  setIterations(flatten(nest), iterations / fullness);
+  setIterations(flatten(nest), iterations / expected::fullness);
   if (tryLoop(best, loop, laneCount, loc, gainOfFlat))
     best.writers = writers;
 }
