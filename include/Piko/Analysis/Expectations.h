@@ -40,6 +40,9 @@ constexpr int64_t longestToMean = 4;
 /// itself.
 constexpr double fullness = 0.85;
 
+/// How often primitives of a bin overwrite a pixel, in the mean.
+constexpr int64_t overwrites = 2;
+
 } // namespace expected
 
 /// How many iterations a loop has that counts up to a constant, or to a

@@ -153,17 +153,47 @@ static double getCost(Operation *op) {
              : cost;
 }
 
-/// Whether computing for each pixel takes longer than keeping so many numbers.
-static bool isWorthwhile(ArrayRef<Operation *> ops, int64_t numbers,
-                         Deferral::To to) {
+static double getCost(ArrayRef<Operation *> ops) {
   double cost = 0;
   for (Operation *op : ops)
     cost += getCost(op);
+  return cost;
+}
+
+/// Those of a slice that nothing else than it and its roots needs: where it has
+/// moved, they are gone. What is used is before its users.
+static SmallVector<Operation *>
+findGone(ArrayRef<Operation *> slice,
+         llvm::function_ref<bool(Operation *)> isRoot) {
+  llvm::SmallPtrSet<Operation *, 32> gone(slice.begin(), slice.end());
+  auto isGone = [&](Operation *user) {
+    if (isRoot(user))
+      return true;
+    while (user && !gone.contains(user))
+      user = user->getParentOp();
+    return user != nullptr;
+  };
+  SmallVector<Operation *> found;
+  for (Operation *op : llvm::reverse(slice))
+    if (llvm::all_of(op->getUsers(), isGone))
+      found.push_back(op);
+    else
+      gone.erase(op);
+  return found;
+}
+
+/// Whether a pixel that primitives overwrite takes longer than one for which so
+/// many numbers are kept: `gone` is what each of them no longer does, `moved`
+/// what is done for the pixel.
+static bool isWorthwhile(ArrayRef<Operation *> gone,
+                         ArrayRef<Operation *> moved, int64_t numbers,
+                         Deferral::To to) {
   // What is stored and read again for a number, in the second level or beyond;
   // and a pixel's iteration of the loop.
   bool isNear = to == Deferral::To::Bin;
   int64_t perNumber = isNear ? 6 : 12, perPixel = isNear ? 64 : 96;
-  return cost > double(perPixel + perNumber * numbers);
+  return expected::overwrites * getCost(gone) >
+         getCost(moved) + double(perPixel + perNumber * numbers);
 }
 
 CommonSlice::Rules Deferral::makeRules() {
@@ -216,8 +246,16 @@ bool Deferral::findWork() {
       return false;
   }
   hasLoops = llvm::any_of(slice.getOperations(), holdsLoop);
-  return slice.cut() && canStore() &&
-         isWorthwhile(slice.getMoved(), slice.getKept().size(), to);
+  if (!slice.cut() || !canStore())
+    return false;
+  SmallVector<Operation *> moved = slice.getMoved();
+  auto isUpdate = [&](Operation *user) {
+    return llvm::any_of(sites.front().updates, [&](UpdateOp update) {
+      return update->isAncestor(user);
+    });
+  };
+  return isWorthwhile(findGone(moved, isUpdate), moved, slice.getKept().size(),
+                      to);
 }
 
 llvm::DenseSet<StringAttr> Deferral::getImages() const {
@@ -411,7 +449,13 @@ static void splitUpdates(BinsOp bins, Deferral::To to) {
   bins.walk([&](UpdateOp update) { updates.push_back(update); });
   for (UpdateOp update : updates)
     splitUpdate(update, [&](ArrayRef<Operation *> work) {
-      return isWorthwhile(work, 0, to);
+      // What the test needs stays, whatever yields it as well.
+      auto isYield = [&](Operation *user) {
+        return user->hasTrait<OpTrait::IsTerminator>() &&
+               update->isAncestor(user);
+      };
+      SmallVector<Operation *> gone = findGone(work, isYield);
+      return isWorthwhile(gone, gone, 0, to);
     });
 }
 

@@ -409,3 +409,49 @@ piko.pipeline @P rank 1 {
     }
   }
 }
+
+// -----
+
+// What takes long is of the test, which has to be done anyway: the color alone
+// would be computed once, and is too little for that. The update is not even
+// taken apart.
+
+piko.record @F {"x" : i32 at 0, "a" : f32 at 4} size 8 align 4
+piko.record @P {"z" : f32 at 0, "c" : f32 at 4} size 8 align 4
+piko.pipeline @Cheap rank 1 {
+  piko.image @color : @P rank 1
+  piko.source @last
+  piko.stage @last bins [64] threads 1 ordered : @F -> [] {}
+  // CHECK-LABEL: piko.kernel @kernel_cheap
+  piko.kernel @kernel_cheap {
+    piko.bins of @last {
+    ^bb0(%bin: index):
+      piko.items of @last {
+      ^bb0(%f: !piko.prim<@F>):
+        %x = piko.get %f "x" : !piko.prim<@F> -> i32
+        %a = piko.get %f "a" : !piko.prim<@F> -> f32
+        %d = math.sqrt %a : f32
+        %e = arith.divf %a, %d : f32
+        %g = math.exp %e : f32
+        %h = math.log %g : f32
+        %i = math.sin %h : f32
+        %z = math.cos %i : f32
+        // CHECK: piko.update
+        // CHECK-NOT: results[
+        // CHECK-NOT: piko.update
+        piko.update @color[%x : i32] in %bin {
+        ^bb0(%old: f32, %oldColor: f32):
+          %test = arith.cmpf olt, %z, %old : f32
+          %depth = arith.select %test, %z, %old : f32
+          %c = scf.if %test -> f32 {
+            %less = arith.addf %z, %a : f32
+            scf.yield %less : f32
+          } else {
+            scf.yield %oldColor : f32
+          }
+          piko.yield [%depth, %c : f32, f32]
+        } {piko.inside}
+      }
+    }
+  }
+}
