@@ -50,7 +50,8 @@ static Result<SceneInput> loadPrimitives(const Options &options) {
   return scene;
 }
 
-Result<SceneInput> render::loadScene(const Options &options) {
+Result<SceneInput> render::loadScene(const Options &options,
+                                     const std::string &tool) {
   if (replay::isCaptureFile(options.scene))
     return loadCapture(options);
   if (isTableFile(options.scene))
@@ -60,7 +61,7 @@ Result<SceneInput> render::loadScene(const Options &options) {
   if (!mesh)
     return mesh.error();
   for (const std::string &warning : mesh->warnings)
-    std::fprintf(stderr, "piko-render: warning: '%s': %s\n",
+    std::fprintf(stderr, "%s: warning: '%s': %s\n", tool.c_str(),
                  options.scene.c_str(), warning.c_str());
   if (options.ground)
     addGround(*mesh);
@@ -70,7 +71,7 @@ Result<SceneInput> render::loadScene(const Options &options) {
   if (!camera)
     return Error{"scene '" + options.scene + "': " + camera.error().message};
   for (const std::string &warning : warnings)
-    std::fprintf(stderr, "piko-render: warning: %s\n", warning.c_str());
+    std::fprintf(stderr, "%s: warning: %s\n", tool.c_str(), warning.c_str());
   SceneInput scene{};
   scene.size = {options.view.width, options.view.height};
   scene.camera = *camera;

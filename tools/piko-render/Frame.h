@@ -35,8 +35,10 @@ struct PipelineOwner {
 /// What went wrong with a pipeline last.
 Error errorOf(pikort_pipeline *pipeline);
 
-/// Reads the scene and sets camera, lights and values as options say.
-Result<SceneInput> loadScene(const Options &options);
+/// Reads the scene and sets camera, lights and values as options say. `tool` is
+/// whose warnings it prints.
+Result<SceneInput> loadScene(const Options &options,
+                             const std::string &tool = "piko-render");
 
 /// Binds a scene, which must outlive the runs, and says how sources are
 /// divided, which a capture has of its host: the name of the image.

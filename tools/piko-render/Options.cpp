@@ -241,6 +241,30 @@ std::string findProblem(const Options &options) {
 
 } // namespace
 
+void render::addSizeOptions(CommandLine &line, Options &options) {
+  line.addNumber("--width", "W", options.view.width, "pixels of a row (1024)",
+                 1, 65536);
+  line.addNumber("--height", "H", options.view.height, "rows (768)", 1, 65536);
+}
+
+void render::addViewOptions(CommandLine &line, Options &options) {
+  line.addNumber("--lights", "L", options.lights,
+                 "number of lights, 0 for none (1)", 0, 1'000'000);
+  addPoint(line, "--eye", options.view.eye,
+           "where the camera is (so that the scene fits)");
+  addPoint(line, "--at", options.view.at,
+           "where it looks (at the scene's middle, along -z)");
+  line.addNumber("--fovy", "DEGREES", options.view.fovy,
+                 "field of view from bottom to top (45)");
+  addDistance(line, "--near", options.view.nearZ,
+              "of the plane before which nothing is drawn (before all that is "
+              "seen)");
+  addDistance(line, "--far", options.view.farZ,
+              "of the plane behind which nothing is drawn (about the scene)");
+  line.add_flag("--cull", options.cull, "leave out back faces");
+  line.add_flag("--ground", options.ground, "put a square under the scene");
+}
+
 void render::addSceneOptions(CommandLine &line, Options &options) {
   line.addText("PIPELINE", "", options.pipeline,
                "the text of a pipeline, or a library of what pikoc made of it");
@@ -287,26 +311,9 @@ void render::addSceneOptions(CommandLine &line, Options &options) {
                  "primitives of a source in a strip (0, what fits)", 0);
 
   line.beginGroup(ofSizes);
-  line.addNumber("--width", "W", options.view.width, "pixels of a row (1024)",
-                 1, 65536);
-  line.addNumber("--height", "H", options.view.height, "rows (768)", 1, 65536);
-
+  addSizeOptions(line, options);
   line.beginGroup(ofScenes);
-  line.addNumber("--lights", "L", options.lights,
-                 "number of lights, 0 for none (1)", 0, 1'000'000);
-  addPoint(line, "--eye", options.view.eye,
-           "where the camera is (so that the scene fits)");
-  addPoint(line, "--at", options.view.at,
-           "where it looks (at the scene's middle, along -z)");
-  line.addNumber("--fovy", "DEGREES", options.view.fovy,
-                 "field of view from bottom to top (45)");
-  addDistance(line, "--near", options.view.nearZ,
-              "of the plane before which nothing is drawn (before all that is "
-              "seen)");
-  addDistance(line, "--far", options.view.farZ,
-              "of the plane behind which nothing is drawn (about the scene)");
-  line.add_flag("--cull", options.cull, "leave out back faces");
-  line.add_flag("--ground", options.ground, "put a square under the scene");
+  addViewOptions(line, options);
 }
 
 std::string render::checkOptions(const CommandLine &line, Options &options) {

@@ -43,8 +43,12 @@ struct Options {
   bool quiet = false; ///< no summary
 };
 
-/// Those of what is rendered, and how it is seen and run, which piko-tune has,
-/// too.
+/// The image's size, and how a scene is seen and lit, which a renderer beside
+/// Piko has, too.
+void addSizeOptions(CommandLine &line, Options &options);
+void addViewOptions(CommandLine &line, Options &options);
+
+/// Those, what is rendered, and how it is run, which piko-tune has, too.
 void addSceneOptions(CommandLine &line, Options &options);
 
 /// Whether what was read is fine together; returns what is wrong, or nothing.
