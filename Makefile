@@ -90,7 +90,7 @@ gpu-bench: configure
 # What proves and times pipelines on a machine that has a card and no LLVM.
 gpu-kit: configure
 	@cmake --build $(BUILD) --parallel $(JOBS) --target \
-	  pikoc piko-compare piko-render piko-render-library PikoConformance-cuda
+	  pikoc piko-compare piko-render piko-render-library PikoConformance-cuda gl-peer
 	@utils/gpu-kit/make.py --build $(BUILD) $(GPU_KIT)
 
 # Debian's python3-matplotlib is for its own python3.

@@ -47,17 +47,18 @@ def summarize(results):
     for step in dict.fromkeys(step for step, _ in results):
         of_step = [told for (other, _), told in results.items() if other == step]
         counts = [sum(told["status"] == status for told in of_step)
-                  for status in ("ok", "failed", "left")]
+                  for status in ("ok", "failed", "left", "absent")]
         rows.append([step, *counts, f"{sum(it.get('seconds', 0) for it in of_step):.0f}"])
     return table(["step", "ok", "failed", "left for want of time",
-                  "seconds of its processes"], rows)
+                  "that the machine lacks", "seconds of its processes"], rows)
 
 
-def list_failures(results):
+def list_reasons(results, status):
+    """Of what has that status, the first line of what it said; empty if nothing has."""
     rows = [[step, name, told.get("text", "").strip().splitlines()[0][:160]
              .replace("|", "\\|") if told.get("text", "").strip() else told.get("code")]
-            for (step, name), told in results.items() if told["status"] == "failed"]
-    return table(["step", "what", "why"], rows) if rows else "Nothing failed.\n"
+            for (step, name), told in results.items() if told["status"] == status]
+    return table(["step", "what", "why"], rows) if rows else ""
 
 
 def list_smoke(results):
@@ -81,26 +82,61 @@ def frames_of(results):
     return frames, kernels
 
 
+def opengl_of(results):
+    """{(scene, lights): {technique: told}} of frames by OpenGL."""
+    found = {}
+    for (step, _), told in results.items():
+        if step == "opengl" and told["status"] == "ok" and "technique" in told:
+            key = told["scene"], int(told["lights"])
+            found.setdefault(key, {})[told["technique"]] = told["told"]
+    return found
+
+
+def describe_opengl(opengl):
+    """By what it was drawn, and how far its pictures are from Piko's."""
+    all_told = [told for techniques in opengl.values() for told in techniques.values()]
+    if not all_told:
+        return ""
+    renderers = dict.fromkeys(f"{it['renderer']}, {it['version']}" for it in all_told)
+    differing = [it["differs"] for it in all_told if "differs" in it]
+    compared = (f"; of its pictures at most {max(differing):,} pixels differ from Piko's "
+                "by more than 2 of 255" if differing else "")
+    return (f"OpenGL is {'; '.join(renderers)}: fragments are shaded in the mesh's order "
+            f"(forward), or after a pass of depths (prepass){compared}. What is over "
+            "OpenGL is over the faster of these.\n")
+
+
 def device_of(told):
     return told.get("time", {}).get("device_ms", 0)
 
 
-def list_frames(frames, peers):
+def list_frames(frames, peers, opengl):
     """Wall clock and the device's events; beside them what Baseline takes."""
     rows = []
-    for (scene, lights), pipes in sorted(frames.items()):
+    for scene, lights in sorted({*frames, *opengl}):
+        pipes = frames.get((scene, lights), {})
+        techniques = opengl.get((scene, lights), {})
         base = pipes.get(BASE, {}).get("ms_median")
-        best = min(it["ms_median"] for it in pipes.values())
+        best = min([it["ms_median"] for it in pipes.values()], default=0)
         peer = peers.get(scene, {}).get("told", {}).get("ms_median")
+        other = min([it["wall_ms_median"] for it in techniques.values()], default=0)
+        for technique, told in techniques.items():
+            ms = told["wall_ms_median"]
+            rows.append([scene, f"{told['tris']:,}", lights, f"OpenGL {technique}",
+                         f"{ms:.3f}", f"{told['wall_ms_min']:.3f}",
+                         f"{told['ms_median']:.3f}", f"{ms / base:.2f}" if base else "",
+                         f"{ms / other:.2f}" if other else "", ""])
         for pipe, told in pipes.items():
             ms = told["ms_median"]
             rows.append([scene, f"{told.get('tris', 0):,}", lights,
                          f"**{pipe}**" if ms == best and len(pipes) > 1 else pipe,
                          f"{ms:.3f}", f"{told['ms_min']:.3f}", f"{device_of(told):.3f}",
                          f"{ms / base:.2f}" if base else "",
+                         f"{ms / other:.2f}" if other else "",
                          f"{ms / peer:.2f}" if peer and lights == 1 else ""])
     return table(["scene", "triangles", "lights", "pipeline", "ms, median", "least",
-                  "of them on the device", f"over {BASE}", "over the peer"], rows)
+                  "of them on the device", f"over {BASE}", "over OpenGL",
+                  "over the peer"], rows)
 
 
 def list_kernels(kernels):
@@ -146,6 +182,7 @@ def draw_lights(frames, path):
 
 def write_page(results, out):
     frames, kernels = frames_of(results)
+    opengl = opengl_of(results)
     peers = {name.removeprefix("peer "): told for (step, name), told in results.items()
              if step == "peer" and told["status"] == "ok"}
     card = results.get(("smoke", "kit"), {})
@@ -154,14 +191,18 @@ def write_page(results, out):
              f"{card.get('device', 'An unknown device')}; tree: commit "
              f"{card.get('commit', 'unknown')}. By `run.sh` of the GPU kit; "
              "`benchmarks/gpu-results.py` has made this page.\n",
-             summarize(results), "## What failed\n", list_failures(results)]
+             summarize(results), "## What failed\n",
+             list_reasons(results, "failed") or "Nothing failed.\n"]
+    if absent := list_reasons(results, "absent"):
+        parts += ["## What the machine lacks\n", absent]
     if smoke := list_smoke(results):
         parts += ["## Each thing by itself\n", smoke]
-    if frames:
+    if frames or opengl:
         parts += ["## Frames\n",
                   "1024 x 768. The median by the host's clock, the least, and what the "
-                  "device's events say of a mean frame. The fastest of a scene is bold.\n",
-                  list_frames(frames, peers)]
+                  "device's events say of a mean frame, of OpenGL a median one. The fastest "
+                  "pipeline of a scene is bold.\n",
+                  describe_opengl(opengl), list_frames(frames, peers, opengl)]
         if draw_lights(frames, chart):
             parts.append(f"![frame times over {BASE}]({os.path.basename(chart)})\n")
     if kernels:

@@ -33,7 +33,7 @@ SIZES = [(320, 240), (1024, 768)]
 # What piko-render draws; the first one is the most telling.
 EXAMPLES = ["visibility", "raster", "shadow", "oit", "raytrace", "reyes"]
 TARGETS = ["pikoc", "piko-compare", "piko-render", "piko-render-library", "pikort",
-           "PikoConformance-cuda"]
+           "PikoConformance-cuda", "gl-peer"]
 
 
 def parse_arguments():
@@ -45,8 +45,9 @@ def parse_arguments():
     parser.add_argument("--out", type=pathlib.Path, help="(BUILD/gpu-kit.tar.zst)")
     parser.add_argument("--scene", action="append", default=[], type=pathlib.Path,
                         help="a mesh to draw and time as well; may be repeated")
-    parser.add_argument("--chips", default="sm_80,sm_90,sm_100",
-                        help="for which there are cubins (sm_80,sm_90,sm_100)")
+    parser.add_argument("--chips", default="sm_80,sm_90,sm_100,sm_120",
+                        help="for which there are cubins where ptxas knows them "
+                             "(sm_80,sm_90,sm_100,sm_120)")
     parser.add_argument("--random-chips", default="sm_90", metavar="CHIPS",
                         help="the same of random pipelines; others translate (sm_90)")
     parser.add_argument("--random", default=500, type=int, metavar="N",
@@ -99,8 +100,8 @@ class Maker:
 
     def build(self):
         call(["cmake", "--build", self.arguments.build, "--target", *TARGETS])
-        programs = [self.tools / "piko-render-library",
-                    self.tools / "PikoConformance-cuda"]
+        programs = [self.tools / name for name in
+                    ("piko-render-library", "PikoConformance-cuda", "gl-peer")]
         own = "linux-vdso|ld-linux|libc|libm|libdl|libpthread|librt"
         for program in programs:
             shutil.copy(program, self.kit / "bin")

@@ -18,6 +18,8 @@ what to bring back, and what benchmarks/gpu-results.py makes tables of. Steps:
   rerun        a hundred runs of six pipelines leave one picture
   random       random pipelines leave what the reference executor does
   peer         with --peer: the same scenes by another renderer
+  opengl       the same scenes and lights by OpenGL, through EGL where the machine has
+               it: Piko's picture, but for a few pixels, and the time of that
   sanitize     compute-sanitizer, where it is, finds nothing in small cases
 """
 
@@ -41,11 +43,13 @@ from scenes import camera_of
 KIT = pathlib.Path(__file__).resolve().parent
 RENDER = KIT / "bin/piko-render-library"
 CONFORMANCE = KIT / "bin/PikoConformance-cuda"
+GL_PEER = KIT / "bin/gl-peer"
+PROGRAMS = (RENDER, CONFORMANCE, GL_PEER)
 STEPS = ["smoke", "conformance", "examples", "time", "rerun", "random", "peer",
-         "sanitize"]
+         "opengl", "sanitize"]
 # Of eight minutes; later steps share what a step leaves.
-SHARES = {"smoke": 60, "conformance": 60, "examples": 80, "time": 130, "rerun": 30,
-          "random": 60, "peer": 30, "sanitize": 30}
+SHARES = {"smoke": 60, "conformance": 60, "examples": 75, "time": 120, "rerun": 30,
+          "random": 55, "peer": 20, "opengl": 30, "sanitize": 30}
 # What each stands for, and which conformance test has it by itself.
 SMOKE = [("a kernel and its clears", "Frame.ImagesAreClearedAndBuffersStay", {}),
          ("a join by one block", "Order.BranchesAndSourcesJoin", {}),
@@ -60,6 +64,13 @@ SMOKE = [("a kernel and its clears", "Frame.ImagesAreClearedAndBuffersStay", {})
 RERUN = [("visibility", "Visibility"), ("raster", "Tiled"), ("raster", "Baseline"),
          ("shadow", "Bins16"), ("oit", "Bins16"), ("reyes", "Reyes")]
 LIGHTS = [1, 10, 100, 1000]
+# gl-peer's exit status where a machine lacks EGL, or OpenGL by a card.
+NO_OPENGL = 3
+TECHNIQUES = ["forward", "prepass"]
+DRAWN_BY_OPENGL = [("visibility", "Visibility"), ("raster", "Fused")]
+# Of all pixels, how many may be another triangle's by OpenGL: at edges, where what
+# rounds a corner's place decides.
+MOST_DIFFERING = 0.01
 
 
 def parse_arguments():
@@ -81,6 +92,8 @@ def parse_arguments():
                         help="prints as its last line JSON with ms_median; {scene}, "
                              "{lights}, {width} and {height} stand for what is drawn, "
                              "and the scene's camera is added in piko-render's words")
+    parser.add_argument("--software-opengl", action="store_true",
+                        help="opengl by a renderer on the processor, to try the step")
     arguments = parser.parse_args()
     try:
         fill_in(arguments.peer or "", "", 1)
@@ -112,26 +125,29 @@ class Run:
 
     def begin(self, step):
         self.step = step
-        self.counts = {"ok": 0, "failed": 0, "left": 0}
+        self.counts = {"ok": 0, "failed": 0, "left": 0, "absent": 0}
         now = time.monotonic()
         to_come = self.chosen[self.chosen.index(step):]
         self.step_end = now + ((self.end - now) * SHARES[step]
                                / sum(SHARES[it] for it in to_come))
 
     def note(self, name, status, **more):
-        """status: ok, failed, or left (for want of time)."""
+        """status: ok, failed, left (for want of time), or absent (the machine has no
+        such thing, which is no failure)."""
         with self.lock:
             self.counts[status] += 1
             self.log.write(json.dumps({"step": self.step, "name": name,
                                        "status": status, **more}) + "\n")
             self.log.flush()
             os.fsync(self.log.fileno())
-        if status == "failed":
-            print(f"  {name}: {more.get('text', '').strip()[:400]}", flush=True)
+        if status in ("failed", "absent"):
+            out = "left out: " if status == "absent" else ""
+            print(f"  {name}: {out}{more.get('text', '').strip()[:400]}", flush=True)
 
-    def call(self, name, words, judge=None, limit=60, **environment):
+    def call(self, name, words, judge=None, limit=60, absent=None, **environment):
         """Runs a command and notes how it went; what it printed, or None. `judge`
-        takes that, and returns what is wrong and what else to note."""
+        takes that, and returns what is wrong and what else to note. `absent`: the exit
+        status that says that the machine lacks what is needed."""
         left = self.step_end - time.monotonic()
         if left < 1:
             self.note(name, "left")
@@ -145,7 +161,7 @@ class Run:
         start = time.monotonic()
         code, out, text = run_limited(
             [str(word) for word in words], min(limit * self.arguments.slow, left),
-            {**os.environ, **(self.own if words[0] in (RENDER, CONFORMANCE) else {}),
+            {**os.environ, **(self.own if words[0] in PROGRAMS else {}),
              **environment})
         seconds = round(time.monotonic() - start, 3)
         wrong, more = ("", {})
@@ -155,7 +171,8 @@ class Run:
             except (ValueError, LookupError, TypeError) as error:
                 wrong = f"expected a line of JSON, but {error}"
         ok = code == 0 and not wrong
-        self.note(name, "ok" if ok else "failed", seconds=seconds, code=code,
+        status = "ok" if ok else "absent" if code == absent else "failed"
+        self.note(name, status, seconds=seconds, code=code,
                   **({"environment": environment} if environment else {}), **more,
                   **({} if ok else {"text": (wrong + "\n" + text[-3000:]).strip()}))
         return out if ok else None
@@ -278,16 +295,20 @@ def make_scenes(run):
         run.call("scenes", [sys.executable, KIT / "scenes.py", KIT / "scenes"])
 
 
+def list_meshes():
+    """What frames are timed of."""
+    meshes = sorted(it for it in (KIT / "scenes").iterdir()
+                    if it.suffix not in ("", ".bpt") and it.name != "torus.ply")
+    return meshes or [KIT / "scenes/torus.ply"]
+
+
 def time_frames(run):
     make_scenes(run)
     frames = ["--warmup", "5", "--frames", "60", "--seconds", "0.5"]
     pipes = list(dict.fromkeys((it["library"], it["pipe"])
                                for it in run.manifest["pictures"]))
     own = {(it["library"], it["pipe"]): it for it in run.manifest["pictures"]}
-    meshes = sorted(it for it in (KIT / "scenes").iterdir()
-                    if it.suffix not in ("", ".bpt") and it.name != "torus.ply")
-    if not meshes:
-        meshes = [KIT / "scenes/torus.ply"]
+    meshes = list_meshes()
 
     def measure(pipe, scene, lights, *more):
         options = [] if scene.suffix == ".capture" else [
@@ -363,6 +384,54 @@ def peer(run):
                      fill_in(run.arguments.peer, scene, 1) + camera_of(scene), judge)
 
 
+def judge_opengl(**more):
+    """It is Piko's picture; `more` is noted, too."""
+    def judge(out):
+        told = json.loads(out.splitlines()[-1])
+        differing, pixels = told.get("differs", 0), told["w"] * told["h"]
+        wrong = "" if differing <= MOST_DIFFERING * pixels else (
+            f"expected Piko's picture, but {differing} of {pixels} pixels differ")
+        return wrong, {**more, "told": told}
+    return judge
+
+
+def opengl(run):
+    """By each technique, with each number of lights."""
+    words = [GL_PEER, *["--software"] * run.arguments.software_opengl]
+    torus = KIT / "scenes/torus.ply"
+    if not run.call("OpenGL", [*words, torus, "--frames", "1"], judge_opengl(),
+                    absent=NO_OPENGL):
+        return
+    make_scenes(run)
+    pipe = next(((it["library"], it["pipe"]) for it in run.manifest["pictures"]
+                 if (example_of(it["library"]), it["pipe"]) in DRAWN_BY_OPENGL), None)
+    with tempfile.TemporaryDirectory() as folder:
+        picture = pathlib.Path(folder) / "picture.png"
+        for scene in list_meshes():
+            for lights in LIGHTS:
+                view = [scene, *camera_of(scene), "--lights", str(lights)]
+                compare_opengl(run, words, view, pipe, picture)
+
+
+def compare_opengl(run, words, view, pipe, picture):
+    """A scene as it is seen, by OpenGL, beside the processor's picture of a pipeline,
+    if there is one."""
+    scene, lights = view[0].name, int(view[-1])
+    picture.unlink(missing_ok=True)
+    if pipe:
+        run.call(f"picture of {scene} {lights}",
+                 [RENDER, KIT / pipe[0], "--pipe", pipe[1], *view, "--frames", "1",
+                  "--warmup", "0", "--quiet", "--out", picture],
+                 PIKO_CUDA_DRIVER="none.so")
+    for technique in TECHNIQUES:
+        run.call(f"OpenGL {technique} {scene} {lights}",
+                 [*words, *view, "--technique", technique, "--warmup", "5", "--frames",
+                  "60", "--seconds", "0.5",
+                  *(["--compare", picture] if picture.exists() else [])],
+                 judge_opengl(technique=technique, scene=scene, lights=lights),
+                 absent=NO_OPENGL)
+
+
 def sanitize(run):
     tool = shutil.which("compute-sanitizer") or "/usr/local/cuda/bin/compute-sanitizer"
     if not os.access(tool, os.X_OK):
@@ -377,14 +446,14 @@ def main():
     run = Run(arguments)
     steps = {"smoke": smoke, "conformance": conformance, "examples": examples,
              "time": time_frames, "rerun": rerun, "random": random, "peer": peer,
-             "sanitize": sanitize}
+             "opengl": opengl, "sanitize": sanitize}
     failed, left = 0, []
     for step in run.chosen:
         run.begin(step)
         print(step, flush=True)
         steps[step](run)
-        print("  " + ", ".join(f"{count} {what}" for what, count in run.counts.items()),
-              flush=True)
+        print("  " + ", ".join(f"{count} {what}" for what, count in run.counts.items()
+                               if count or what != "absent"), flush=True)
         failed += run.counts["failed"]
         left += [step] if run.counts["left"] else []
     if left:
