@@ -116,6 +116,14 @@ public:
       throw OutOfMemory{INT64_MAX};
     block_ = memory.acquire(bytes, use);
   }
+  /// Of memory that is another's.
+  static Array borrow(T *data, int64_t size) {
+    Array array;
+    array.block_ = {reinterpret_cast<uint8_t *>(data),
+                    static_cast<size_t>(size) * sizeof(T)};
+    array.size_ = size;
+    return array;
+  }
   Array(Array &&other) noexcept { swap(other); }
   Array &operator=(Array &&other) noexcept {
     Array taken(std::move(other));
@@ -123,7 +131,7 @@ public:
     return *this;
   }
   ~Array() {
-    if (block_.data)
+    if (block_.data && memory_)
       memory_->release(block_, use_);
   }
 
@@ -134,6 +142,7 @@ public:
   }
   T &operator[](int64_t i) const { return data()[i]; }
   explicit operator bool() const { return block_.data != nullptr; }
+  bool isBorrowed() const { return block_.data && !memory_; }
 
 private:
   void swap(Array &other) {

@@ -57,9 +57,11 @@ struct State {
   std::string name;
   int32_t kind = 0, record = 0, rank = 0, perSource = -1;
   bool bound = false;
-  bool written = false;       ///< A buffer that kernels change.
-  bool unused = false;        ///< A buffer that no kernel uses.
-  bool internal = false;      ///< An image that the host does not see.
+  bool written = false;  ///< A buffer that kernels change.
+  bool unused = false;   ///< A buffer that no kernel uses.
+  bool internal = false; ///< An image that the host does not see.
+  /// The stage in whose bins ranks use pixels that they own, and no others.
+  int32_t commonStage = -1;
   bool onDevice = false;      ///< What is bound is a device's memory.
   std::vector<uint8_t> clear; ///< One record, or empty.
   std::vector<uint8_t> bytes; ///< A constant's, ...
@@ -159,6 +161,7 @@ struct Source {
   bool twinIsCurrent = false;     ///< ... if it is what was bound.
   const uint8_t *hosts = nullptr; ///< That memory meanwhile.
   int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
+  bool exchanged = false;         ///< Between ranks: its bins.
 };
 
 /// What a kernel does to a field of a piece of state: see PrivateCopies.h.
@@ -189,6 +192,7 @@ struct Stage {
   int32_t root = 0;        ///< Of the lineage that it starts.
   int32_t keyWidth = 0;    ///< 64-bit words of its items' keys, 0 = none.
   int32_t partition = 0;   ///< Which ranks run it: a pikoir_partition.
+  int32_t owners = 0;      ///< Of bins: a pikort_owners, or 0.
   int32_t launchOrder = 0; ///< Of programs for ranks: when its kernel runs.
   std::vector<Reduction> reductions; ///< Of its kernel, by private copy.
   std::vector<Selection> selections; ///< Of its kernel.
@@ -354,6 +358,7 @@ struct pikort_pipeline {
   std::unique_ptr<piko::rt::Ranks> ranks; ///< None: a process of its own.
   pikort_program program{};               ///< That made it, but for its name.
   int32_t threadRanks = 0;                ///< In this process; 0 = not said.
+  int32_t rankOwners = 0; ///< A pikort_owners, as the host has it.
   std::unique_ptr<piko::rt::Siblings> siblings; ///< These, but for the first.
   int32_t runningKernel = 0; ///< Launch order of the kernel that began last.
   piko::rt::ErrorPlace errorPlace;

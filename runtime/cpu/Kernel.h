@@ -343,6 +343,9 @@ Stream placeStreams(pikort_pipeline &p, std::vector<Stream> &streams,
 // --- Buckets.cpp
 // --------------------------------------------------------------
 
+/// The buckets that the AssignBin of a source has found; throws.
+Stream gatherBuckets(pikort_pipeline &p, int32_t source);
+
 /// Sets the kernel's positions, order and offsets, and rank if `rankNeeded`.
 void binItems(pikort_pipeline &p, const Stage &stage, Kernel &kernel,
               bool rankNeeded);

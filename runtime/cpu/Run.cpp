@@ -6,6 +6,7 @@
 #include "cpu/loops/Strips.h"
 #include "cpu/state/PrivateCopies.h"
 #include "cpu/state/PrivateImages.h"
+#include "ranks/Ranks.h"
 
 #include <algorithm>
 
@@ -119,6 +120,8 @@ prepareThreads(pikort_pipeline &p, const Stage &stage, Kernel &kernel) {
       rankNeeded |= p.edges[e].keyed() || p.edges[e].gather == PIKOIR_PERMUTE;
   binItems(p, stage, kernel, rankNeeded);
   cutUnits(p, stage, kernel);
+  if (p.ranks)
+    p.ranks->noteBins(stage, kernel);
   prepareOutputs(p, stage, kernel);
   openLanes(p, kernel);
 }
@@ -139,6 +142,8 @@ static void prepareStage(pikort_pipeline &p, Kernel &kernel) {
   if (kernel.runsSerially) {
     Items input = cycle->serialInput(kernel);
     kernel.serial->begin(input);
+    if (p.ranks)
+      p.ranks->noteBuckets(stage, input);
     stats.in += input.count;
   } else {
     kernel.stream =

@@ -53,13 +53,18 @@ bool wait(Context &context) {
       return false;
     if (done)
       return true;
-    // Others may need this core.
-    if (turn > 200)
-      std::this_thread::sleep_for(
-          std::chrono::microseconds(std::min<int64_t>(200, (turn - 200) / 8)));
+    // Others may need this core. To sleep takes 60 us at least.
+    constexpr int64_t spins = 200;
+    if (turn < spins)
+      continue;
+    std::this_thread::yield();
+    if (turn % spins != 0)
+      continue;
     double spent = std::chrono::duration<double>(Clock::now() - begin).count();
     if (context.seconds > 0 && spent > context.seconds)
       break;
+    if (spent > 0.02)
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
   std::string late;
   for (size_t i = 0; i < context.peers.size(); ++i) {

@@ -24,6 +24,21 @@ static Edge &findEdge(pikort_pipeline *p, int32_t producer, int32_t port) {
                                         std::to_string(producer)};
 }
 
+static Source &findSource(pikort_pipeline *p, int32_t source) {
+  if (static_cast<size_t>(source) < p->sources.size())
+    return p->sources[source];
+  throw Failure{PIKORT_BAD_PROGRAM,
+                "ranks: expected the number of a source, but got " +
+                    std::to_string(source)};
+}
+
+static void checkOwners(int32_t owners, const std::string &who) {
+  if (owners < PIKORT_OWNERS_DEFAULT || owners > PIKORT_OWNERS_LOAD)
+    throw Failure{PIKORT_INVALID_ARGUMENT,
+                  who + ": expected a way to find owners of bins, but got " +
+                      std::to_string(owners)};
+}
+
 /// The begin of errors about a piece of state that there is.
 static auto nameOf(const pikort_pipeline *p, int32_t state) {
   return [=] { return "state " + quoted(p->states[state].name); };
@@ -60,7 +75,7 @@ extern "C" {
 void pikoir_declare_partition(pikort_pipeline *p, int32_t stage, int32_t how) {
   guarded(p, "setup", [&] {
     Stage &declared = findStage(p, stage);
-    if (how < PIKOIR_FIRST_RANK || how > PIKOIR_BINS)
+    if (how < PIKOIR_FIRST_RANK || how > PIKOIR_EACH_RANK)
       throw Failure{PIKORT_BAD_PROGRAM,
                     "stage " + quoted(declared.name) +
                         ": expected a way to partition it, but got " +
@@ -70,9 +85,34 @@ void pikoir_declare_partition(pikort_pipeline *p, int32_t stage, int32_t how) {
   });
 }
 
+void pikoir_declare_owners(pikort_pipeline *p, int32_t stage, int32_t owners) {
+  guarded(p, "setup", [&] {
+    Stage &declared = findStage(p, stage);
+    checkOwners(owners, "stage " + quoted(declared.name));
+    declared.owners = owners;
+  });
+}
+
+void pikoir_declare_common(pikort_pipeline *p, int32_t state, int32_t stage) {
+  guarded(p, "setup", [&] {
+    checkState(p, state);
+    if (p->states[state].kind != PIKORT_IMAGE ||
+        findStage(p, stage).partition != PIKOIR_BINS)
+      throw Failure{PIKORT_BAD_PROGRAM,
+                    "state " + quoted(p->states[state].name) +
+                        ": expected an image, and a stage whose bins have "
+                        "owners"};
+    p->states[state].commonStage = stage;
+  });
+}
+
 void pikoir_declare_exchange(pikort_pipeline *p, int32_t producer,
                              int32_t port) {
   guarded(p, "setup", [&] { findEdge(p, producer, port).exchanged = true; });
+}
+
+void pikoir_declare_exchange_source(pikort_pipeline *p, int32_t source) {
+  guarded(p, "setup", [&] { findSource(p, source).exchanged = true; });
 }
 
 int32_t pikoir_exchange(pikort_pipeline *p, int32_t producer, int32_t port) {
@@ -83,11 +123,27 @@ int32_t pikoir_exchange(pikort_pipeline *p, int32_t producer, int32_t port) {
                  [&] { p->ranks->exchange(findEdge(p, producer, port)); });
 }
 
-int32_t pikoir_keep(pikort_pipeline *p, int32_t state) {
+int32_t pikoir_exchange_source(pikort_pipeline *p, int32_t source) {
+  auto who = [&] { return "exchange of source " + std::to_string(source); };
+  return meeting(p, who, [&] {
+    findSource(p, source);
+    p->ranks->exchangeSource(source);
+  });
+}
+
+static int32_t keep(pikort_pipeline *p, int32_t state, bool cleared) {
   return meeting(p, nameOf(p, state), [&] {
     checkState(p, state);
-    p->ranks->keep(state);
+    p->ranks->keep(state, cleared);
   });
+}
+
+int32_t pikoir_keep(pikort_pipeline *p, int32_t state) {
+  return keep(p, state, /*cleared=*/false);
+}
+
+int32_t pikoir_keep_cleared(pikort_pipeline *p, int32_t state) {
+  return keep(p, state, /*cleared=*/true);
 }
 
 void pikoir_share_field(pikort_pipeline *p, int32_t state, int64_t offset,
@@ -132,6 +188,14 @@ int32_t pikort_set_ranks(pikort_pipeline *p, const pikort_ranks *ranks) {
               std::to_string(ranks->rank) + " of " +
               std::to_string(ranks->size));
     p->ranks = std::make_unique<Ranks>(*p, *ranks);
+  });
+}
+
+int32_t pikort_set_rank_owners(pikort_pipeline *p, int32_t owners) {
+  return call(p, [&] {
+    checkOwners(owners, "pipeline " + quoted(p->name));
+    awaitRun(*p);
+    p->rankOwners = owners;
   });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
-//===- Ranks.cpp - Meetings of ranks, and who owns what -------------------===//
+//===- Ranks.cpp - Runs and meetings of ranks -------------------===//
 
 #include "ranks/Ranks.h"
 
@@ -7,34 +7,57 @@
 #include "cpu/Kernel.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
+#include <memory>
+#include <new>
+#include <optional>
 
 using namespace piko::rt;
 
-// --- Who owns what ----------------------------------------------------------
+// --- Runs -------------------------------------------------------------------
 
-/// Neighbours have different owners, in each dimension, so that what fills a
-/// part of the domain is work for all.
-int32_t Ranks::ownerOf(const Stage &stage, int64_t bin) const {
-  int64_t sum = 0;
-  for (int32_t d = 0, step = 1; d < p_.rank; ++d, step *= 3) {
-    sum += bin % stage.grid[d] * step;
-    bin /= stage.grid[d];
-  }
-  return static_cast<int32_t>(sum % size());
+void Ranks::prepareRun() {
+  sparse_.clear();
+  sourceBuckets_.clear();
+  balanceOwners();
+  owners_.beginRun();
+  findCommonMemory();
 }
 
-std::vector<int32_t> Ranks::findOwners(const Stage &stage) const {
-  std::vector<int32_t> owners(static_cast<size_t>(stage.bins()));
-  for (size_t bin = 0; bin < owners.size(); ++bin)
-    owners[bin] = ownerOf(stage, static_cast<int64_t>(bin));
-  return owners;
+/// Where owners follow the load, tells others what this rank's bins had.
+void Ranks::balanceOwners() {
+  for (OwnedGrid &grid : owners_.grids()) {
+    if (grid.way != PIKORT_OWNERS_LOAD)
+      continue;
+    std::vector<int64_t> own;
+    for (size_t bin = 0; bin < grid.owners.size(); ++bin)
+      if (grid.owners[bin] == rank())
+        own.push_back(grid.load[bin]);
+    std::vector<Piece> pieces(
+        static_cast<size_t>(size()),
+        {own.data(), static_cast<int64_t>(own.size() * sizeof(int64_t))});
+    Traffic &counted = trafficOf({}, "owners of bins");
+    counted.bytes += pieces[0].bytes * (size() - 1);
+    std::vector<Landing> received = swap(pieces);
+    std::vector<int64_t> load(grid.owners.size()),
+        next(static_cast<size_t>(size()));
+    for (size_t bin = 0; bin < load.size(); ++bin) {
+      auto owner = static_cast<size_t>(grid.owners[bin]);
+      std::memcpy(&load[bin],
+                  received[owner].data + sizeof(int64_t) * next[owner]++,
+                  sizeof(int64_t));
+    }
+    int64_t before = grid.moved;
+    owners_.balance(grid, load);
+    counted.records += grid.moved - before;
+  }
 }
 
 void Ranks::beginRun() {
   for (Source &source : p_.sources) {
     const Stage &stage = p_.stages[source.stage];
-    if (stage.partition == PIKOIR_PARTS) {
+    if (stage.partition == PIKOIR_PARTS || isDivided(source)) {
       auto part = [&](int64_t number) {
         return static_cast<int64_t>(static_cast<__int128>(source.count) *
                                     number / size());
@@ -47,32 +70,131 @@ void Ranks::beginRun() {
   }
 }
 
-void Ranks::filter(const Stage &stage, Items &items,
-                   Array<uint32_t> &storage) const {
+void Ranks::noteBins(const Stage &stage, const Kernel &kernel) {
+  if (stage.partition != PIKOIR_BINS || kernel.source >= 0)
+    return;
+  OwnedGrid &grid = owners_.of(stage);
+  for (int64_t bin = 0; bin < stage.bins(); ++bin) {
+    int64_t count = kernel.offsets[(bin + 1) * stage.tiles] -
+                    kernel.offsets[bin * stage.tiles];
+    auto at = static_cast<size_t>(bin);
+    grid.load[at] += count;
+    if (count > 0 || (stage.visitsAll && grid.owners[at] == rank()))
+      grid.ran[at] = true;
+  }
+  for (int64_t call = 0; call < kernel.calls.size(); ++call)
+    grid.ran[static_cast<size_t>(kernel.calls[call].bin)] = true;
+}
+
+void Ranks::noteBuckets(const Stage &stage, const Items &items) {
   if (stage.partition != PIKOIR_BINS)
     return;
-  Array<uint32_t> owned(p_.memory, items.pairCount);
-  std::vector<int32_t> owners = findOwners(stage);
-  int64_t count = 0, first = 0; // of the pairs of an item
+  OwnedGrid &grid = owners_.of(stage);
   for (int64_t k = 0; k < items.pairCount; ++k) {
-    uint32_t entry = items.pairs[k];
-    if (entry & PIKOIR_FIRST_BUCKET) {
-      first = count;
-      owned[count++] = noBucket;
-    }
-    if (entry == noBucket)
-      continue;
-    uint32_t bucket = entry & ~PIKOIR_FIRST_BUCKET;
-    if (owners[static_cast<size_t>(bucket / stage.tiles)] != rank())
-      continue;
-    if (owned[first] == noBucket)
-      owned[first] = bucket | PIKOIR_FIRST_BUCKET;
-    else
-      owned[count++] = bucket;
+    uint32_t bucket = items.pairs[k] & ~PIKOIR_FIRST_BUCKET;
+    auto bin = static_cast<size_t>(bucket / stage.tiles);
+    ++grid.load[bin];
+    grid.ran[bin] = true;
   }
-  storage = std::move(owned);
-  items.pairs = storage.data();
-  items.pairCount = count;
+}
+
+// --- Memory that ranks share ------------------------------------------------
+
+/// What $PIKO_RANK_MEMORY says: whether ranks of one machine share memory.
+static bool sharesMemory() {
+  const char *text = std::getenv("PIKO_RANK_MEMORY");
+  std::string said = text && *text ? text : "common";
+  if (said != "common" && said != "apart")
+    throw Failure{PIKORT_INVALID_ARGUMENT,
+                  "PIKO_RANK_MEMORY: expected common or apart, but got '" +
+                      said + "'"};
+  return said == "common";
+}
+
+/// The first rank's images are others', too, where these can map them. Who has
+/// a limit for memory has memory of its own, as nobody else counts that.
+void Ranks::findCommonMemory() {
+  std::map<int32_t, int64_t> offsets;
+  int64_t bytes = 0;
+  for (size_t s = 0; s < p_.states.size(); ++s) {
+    const State &state = p_.states[s];
+    if (state.commonStage < 0)
+      continue;
+    int64_t size = p_.records[state.record].size;
+    bool overflow = false;
+    for (int32_t d = 0; d < p_.rank; ++d)
+      overflow |= __builtin_mul_overflow(size, p_.domain[d], &size);
+    if (overflow || size > INT64_MAX / 4 - bytes)
+      throw OutOfMemory{INT64_MAX};
+    offsets[static_cast<int32_t>(s)] = bytes;
+    bytes += (size + 4095) / 4096 * 4096;
+  }
+  if (offsets.empty() || size() == 1)
+    return;
+  auto n = static_cast<size_t>(size());
+  // The host of the first rank has seen what the run before has left there.
+  std::vector<int64_t> all = meet(Going::Begin, std::vector<int64_t>(n, bytes));
+  for (int64_t other : all)
+    if (other != bytes)
+      breakOff("expected all ranks to have the same domain, but they do not");
+  if (bytes == commonBytes_)
+    return;
+  dropCommonMemory();
+  commonBytes_ = bytes;
+  bool shares = sharesMemory() && p_.memory.limit() == 0 && bytes > 0;
+  CommonMemory::Place place;
+  if (rank() == 0 && shares)
+    place = common_.make(bytes);
+  std::vector<CommonMemory::Place> places(n);
+  std::vector<const void *> send(n, &place);
+  std::vector<void *> receive(n);
+  std::vector<int64_t> sendBytes(n, rank() == 0 ? sizeof place : 0),
+      receiveBytes(n);
+  for (size_t r = 0; r < n; ++r)
+    receive[r] = &places[r];
+  sendBytes[static_cast<size_t>(rank())] = 0;
+  receiveBytes[0] = rank() == 0 ? 0 : sizeof place;
+  callTransport(send, sendBytes, receive, receiveBytes);
+  bool found =
+      rank() == 0 ? place.file >= 0 : shares && common_.find(places[0]);
+  all = meet(Going::Begin, std::vector<int64_t>(n, found));
+  bool isCommon = found;
+  for (int64_t other : all)
+    isCommon &= other == 1;
+  common_.close();
+  if (isCommon)
+    commonOffsets_ = std::move(offsets);
+  else
+    common_.reset();
+}
+
+/// No image lies there any more.
+void Ranks::dropCommonMemory() {
+  for (auto [state, offset] : std::exchange(commonOffsets_, {}))
+    if (p_.states[state].owned.isBorrowed()) {
+      p_.states[state].own({});
+      p_.states[state].view.data = nullptr;
+    }
+  common_.reset();
+  commonBytes_ = -1;
+}
+
+uint8_t *Ranks::commonMemory(const State &state) const {
+  auto known =
+      commonOffsets_.find(static_cast<int32_t>(&state - p_.states.data()));
+  return known == commonOffsets_.end() ? nullptr
+                                       : common_.data() + known->second;
+}
+
+bool Ranks::clearsOwnedOnly(const Stage &stage, int32_t state) {
+  if (stage.partition != PIKOIR_BINS)
+    return false;
+  if (commonMemory(p_.states[state]))
+    return true;
+  // What goes to the first rank alone are bins that something has come to.
+  if (rank() != 0)
+    sparse_.insert(state);
+  return rank() != 0;
 }
 
 // --- Meetings ---------------------------------------------------------------
@@ -124,13 +246,9 @@ std::vector<int64_t> Ranks::meet(Going going, const std::vector<int64_t> &bytes,
   }
   if (failed)
     agreeOnError();
-  if (!same) {
-    broken_ = "rank " + std::to_string(rank()) +
-              ": expected all ranks to run the same program with the same "
-              "number of runs, but they do not";
-    throw Failure{PIKORT_RANK_FAILED,
-                  "pipeline " + quoted(p_.name) + ": " + broken_};
-  }
+  if (!same)
+    breakOff("expected all ranks to run the same program with the same number "
+             "of runs, but they do not");
   if (going == Going::Finished) {
     totals.resize(n);
     for (size_t r = 0; r < n; ++r)
@@ -139,33 +257,74 @@ std::vector<int64_t> Ranks::meet(Going going, const std::vector<int64_t> &bytes,
   return result;
 }
 
+void Ranks::breakOff(const std::string &why) {
+  broken_ = "rank " + std::to_string(rank()) + ": " + why;
+  throw Failure{PIKORT_RANK_FAILED,
+                "pipeline " + quoted(p_.name) + ": " + broken_};
+}
+
 /// Brings a piece to each rank; gives what each has for this one. Where memory
-/// for that is refused, all hear of it before any bytes go.
-std::vector<Ranks::Bytes> Ranks::swap(const std::vector<Piece> &pieces) {
+/// for that is refused it comes all the same, as others wait for nothing, and
+/// is dropped; all hear of it in the next meeting.
+std::vector<Ranks::Landing> Ranks::swap(const std::vector<Piece> &pieces,
+                                        Placement placement) {
   auto n = static_cast<size_t>(size());
+  auto self = static_cast<size_t>(rank());
   std::vector<int64_t> sendBytes(n);
   for (size_t r = 0; r < n; ++r)
     sendBytes[r] = pieces[r].bytes;
   std::vector<int64_t> receiveBytes = meet(Going::On, sendBytes);
-  std::vector<Bytes> result(n);
+  std::vector<Landing> result(n);
+  std::vector<std::unique_ptr<uint8_t[]>> dropped(n);
   std::vector<const void *> send(n);
   std::vector<void *> receive(n);
-  int32_t status = guarded(&p_, "pipeline", [&] {
-    for (size_t r = 0; r < n; ++r) {
-      result[r] = Bytes(p_.memory, receiveBytes[r]);
-      send[r] = pieces[r].data;
-      receive[r] = result[r].data();
+  std::optional<OutOfMemory> refused;
+  for (size_t r = 0; r < n; ++r) {
+    send[r] = pieces[r].data;
+    if (receiveBytes[r] == 0)
+      continue;
+    try {
+      if (!refused)
+        result[r] = land(receiveBytes[r], placement);
+    } catch (const OutOfMemory &why) {
+      refused = why;
     }
-  });
-  meet(status == PIKORT_OK ? Going::On : Going::Failed,
-       std::vector<int64_t>(n));
-  auto self = static_cast<size_t>(rank());
-  if (sendBytes[self] > 0)
+    receive[r] = result[r].data;
+    if (!refused || r == self)
+      continue;
+    dropped[r].reset(new (std::nothrow)
+                         uint8_t[static_cast<size_t>(receiveBytes[r])]);
+    if (!dropped[r])
+      breakOff("out of memory for what other ranks send");
+    receive[r] = dropped[r].get();
+  }
+  if (sendBytes[self] > 0 && !refused)
     std::memcpy(receive[self], send[self],
                 static_cast<size_t>(sendBytes[self]));
   sendBytes[self] = receiveBytes[self] = 0;
   callTransport(send, sendBytes, receive, receiveBytes);
+  if (refused)
+    throw *refused;
   return result;
+}
+
+/// Room for what comes. Bytes begin at multiples of eight.
+Ranks::Landing Ranks::land(int64_t bytes, const Placement &placement) {
+  Landing landing;
+  landing.memory = Bytes(p_.memory, bytes + 8 * placement.size);
+  landing.data = landing.memory.data();
+  landing.bytes = bytes;
+  auto like = reinterpret_cast<uintptr_t>(placement.like);
+  auto size = static_cast<uintptr_t>(placement.size);
+  for (uintptr_t pad = 0; pad < 8 * size; pad += 8) {
+    auto at = reinterpret_cast<uintptr_t>(landing.memory.data()) + pad +
+              static_cast<uintptr_t>(placement.after);
+    if (at % size == like % size) {
+      landing.data += pad;
+      break;
+    }
+  }
+  return landing;
 }
 
 // --- Errors -----------------------------------------------------------------
@@ -282,147 +441,4 @@ Ranks::Traffic &Ranks::trafficOf(const std::string &from,
     if (known.from == from && known.to == to)
       return known;
   return traffic.emplace_back(Traffic{from, to});
-}
-
-// --- Exchanges --------------------------------------------------------------
-
-namespace {
-
-/// What one rank sends another of an edge: counts, keys, records, buckets.
-struct Parcel {
-  int64_t count = 0, pairs = 0;
-  uint8_t *keys = nullptr, *records = nullptr, *buckets = nullptr;
-
-  static int64_t align(int64_t bytes) { return (bytes + 63) / 64 * 64; }
-  int64_t bytes(int64_t size, int64_t width) const {
-    return count == 0 ? 0
-                      : 64 + align(count * width * 8) + align(count * size) +
-                            pairs * 4;
-  }
-  /// Finds its parts in memory.
-  void lay(uint8_t *data, int64_t size, int64_t width) {
-    keys = data + 64;
-    records = keys + align(count * width * 8);
-    buckets = records + align(count * size);
-  }
-};
-
-} // namespace
-
-/// What has come of an edge so far.
-static Stream takeEdge(pikort_pipeline &p, Edge &edge) {
-  if (cycleOf(p, p.stages[edge.producer]))
-    return queueOf(p, edge).take(edge.keyWidth);
-  return gatherEdge(p, edge);
-}
-
-void Ranks::exchange(Edge &edge) {
-  const Stage &to = p_.stages[edge.consumer];
-  int64_t size = p_.records[to.record].size, width = edge.keyWidth;
-  auto n = static_cast<size_t>(this->size());
-  Stream stream = takeEdge(p_, edge);
-  bool placed = to.placed(), byBin = to.partition == PIKOIR_BINS;
-  std::vector<int32_t> owners = byBin ? findOwners(to) : std::vector<int32_t>();
-  // Calls body(item, rank, bucket or -1, whether it is the rank's first).
-  auto forTargets = [&](auto &&body) {
-    std::vector<int64_t> latest(n, -1); // item that each rank has got
-    int64_t k = 0;
-    for (int64_t i = 0; i < stream.count; ++i) {
-      if (!placed) {
-        body(i, size_t(0), int64_t(-1), true);
-        continue;
-      }
-      do {
-        uint32_t bucket = stream.pairs[k++] & ~PIKOIR_FIRST_BUCKET;
-        auto target = byBin
-                          ? static_cast<size_t>(
-                                owners[static_cast<size_t>(bucket / to.tiles)])
-                          : size_t(0);
-        body(i, target, int64_t(bucket), latest[target] != i);
-        latest[target] = i;
-      } while (k < stream.pairCount &&
-               !(stream.pairs[k] & PIKOIR_FIRST_BUCKET));
-    }
-  };
-  std::vector<Parcel> parcels(n);
-  forTargets([&](int64_t, size_t r, int64_t bucket, bool first) {
-    parcels[r].count += first;
-    parcels[r].pairs += bucket >= 0;
-  });
-  std::vector<Bytes> memory(n);
-  std::vector<Piece> pieces(n);
-  std::vector<Parcel> next(n);
-  for (size_t r = 0; r < n; ++r) {
-    Parcel &parcel = parcels[r];
-    memory[r] = Bytes(p_.memory, parcel.bytes(size, width));
-    pieces[r] = {memory[r].data(), parcel.bytes(size, width)};
-    if (parcel.count == 0)
-      continue;
-    std::memset(memory[r].data(), 0, static_cast<size_t>(pieces[r].bytes));
-    std::memcpy(memory[r].data(), &parcel.count, 8);
-    std::memcpy(memory[r].data() + 8, &parcel.pairs, 8);
-    parcel.lay(memory[r].data(), size, width);
-    next[r] = parcel;
-  }
-  forTargets([&](int64_t i, size_t r, int64_t bucket, bool first) {
-    Parcel &at = next[r];
-    if (first) {
-      std::memcpy(at.records, stream.item(i, size), static_cast<size_t>(size));
-      at.records += size;
-      for (int64_t w = 0; w < width; ++w, at.keys += 8) {
-        uint64_t word = stream.keys.word(i, static_cast<int32_t>(w));
-        std::memcpy(at.keys, &word, 8);
-      }
-    }
-    if (bucket < 0)
-      return;
-    auto entry =
-        static_cast<uint32_t>(bucket) | (first ? PIKOIR_FIRST_BUCKET : 0u);
-    std::memcpy(at.buckets, &entry, 4);
-    at.buckets += 4;
-  });
-  stream = {};
-  Traffic &counted = trafficOf(p_.stages[edge.producer].name, to.name);
-  for (size_t r = 0; r < n; ++r)
-    if (static_cast<int32_t>(r) == rank()) {
-      counted.kept += parcels[r].count;
-    } else {
-      counted.records += parcels[r].count;
-      counted.bytes += pieces[r].bytes;
-    }
-  std::vector<Bytes> received = swap(pieces);
-  memory.clear();
-
-  std::vector<Stream> streams;
-  for (Bytes &bytes : received) {
-    if (bytes.size() == 0)
-      continue;
-    Parcel parcel;
-    std::memcpy(&parcel.count, bytes.data(), 8);
-    std::memcpy(&parcel.pairs, bytes.data() + 8, 8);
-    parcel.lay(bytes.data(), size, width);
-    Stream &one = streams.emplace_back();
-    one.count = parcel.count;
-    one.pairCount = parcel.pairs;
-    one.items = parcel.records;
-    one.pairs = reinterpret_cast<const uint32_t *>(parcel.buckets);
-    one.keys.width = static_cast<int32_t>(width);
-    if (width > 0) {
-      one.keys.words = Array<uint64_t>(p_.memory, parcel.count * width);
-      std::memcpy(one.keys.words.data(), parcel.keys,
-                  static_cast<size_t>(parcel.count * width) * 8);
-    }
-    one.blocks.push_back(std::move(bytes));
-  }
-  if (streams.size() > 1 && width > 0) {
-    Stage like;
-    like.name = to.name;
-    like.record = to.record;
-    like.flags = to.flags;
-    like.keyWidth = static_cast<int32_t>(width);
-    enqueue(p_, edge, mergeStreams(p_, streams, like));
-    return;
-  }
-  for (Stream &one : streams)
-    enqueue(p_, edge, std::move(one));
 }

@@ -16,12 +16,18 @@
 #include "common/Pipeline.h"
 #include "pikort/abi_ranks.h"
 #include "pikort/ranks.h"
+#include "ranks/CommonMemory.h"
+#include "ranks/Owners.h"
 
+#include <functional>
 #include <map>
+#include <set>
 
 namespace piko::rt {
 
-struct Items; // Kernel.h
+struct Items;  // Kernel.h
+struct Kernel; // Kernel.h
+struct Stream; // Kernel.h
 
 /// A field that several ranks change by one operation.
 struct SharedField {
@@ -32,29 +38,48 @@ struct SharedField {
 class Ranks {
 public:
   Ranks(pikort_pipeline &p, const pikort_ranks &transport)
-      : p_(p), transport_(transport) {}
+      : p_(p), transport_(transport), owners_(p, transport.size) {}
+
+  ~Ranks() { dropCommonMemory(); }
+  Ranks(const Ranks &) = delete;
+  Ranks &operator=(const Ranks &) = delete;
 
   int32_t rank() const { return transport_.rank; }
   int32_t size() const { return transport_.size; }
-  /// Who runs a bin of a stage that is divided by bins.
-  int32_t ownerOf(const Stage &stage, int64_t bin) const;
-  /// The same of all its bins.
-  std::vector<int32_t> findOwners(const Stage &stage) const;
+  /// Who runs the bins of a stage that is divided by bins.
+  const std::vector<int32_t> &ownersOf(const Stage &stage) {
+    return owners_.of(stage).owners;
+  }
   /// Whether this rank runs a bin of a stage.
-  bool owns(const Stage &stage, int64_t bin) const {
-    return stage.partition == PIKOIR_BINS    ? ownerOf(stage, bin) == rank()
-           : stage.partition == PIKOIR_PARTS ? true
-                                             : rank() == 0;
+  bool owns(const Stage &stage, int64_t bin) {
+    return stage.partition == PIKOIR_BINS
+               ? ownersOf(stage)[static_cast<size_t>(bin)] == rank()
+           : stage.partition == PIKOIR_FIRST_RANK ? rank() == 0
+                                                  : true;
   }
 
+  /// Before there is any state: finds owners, and memory for images that ranks
+  /// of one machine share.
+  void prepareRun();
   /// Takes this rank's part of the sources.
   void beginRun();
+  /// The memory of an image that is common; null: it is this rank's own.
+  uint8_t *commonMemory(const State &state) const;
+  /// Which bins a kernel runs.
+  void noteBins(const Stage &stage, const Kernel &kernel);
+  /// The same of a launch that is serial.
+  void noteBuckets(const Stage &stage, const Items &items);
+  /// Whether an image is cleared here in this rank's bins alone.
+  bool clearsOwnedOnly(const Stage &stage, int32_t state);
   /// Of a source's primitives, with their buckets: only those buckets that this
   /// rank owns.
-  void filter(const Stage &stage, Items &items, Array<uint32_t> &storage) const;
+  void filter(const Stage &stage, Items &items, Array<uint32_t> &storage);
   /// These throw.
   void exchange(Edge &edge);
-  void keep(int32_t state);
+  void exchangeSource(int32_t source);
+  /// The buckets of a source that has been exchanged; whether it has been.
+  bool takeBuckets(int32_t source, Array<uint32_t> &buckets);
+  void keep(int32_t state, bool cleared);
   void addField(const SharedField &field) { fields_.push_back(field); }
   void share(int32_t state, const Stage *stage, int32_t flags);
   /// Ends a run; its status is that of all ranks then.
@@ -70,10 +95,22 @@ public:
 private:
   using Bytes = Array<uint8_t>;
   struct Piece {
-    const void *data;
-    int64_t bytes;
+    const void *data = nullptr;
+    int64_t bytes = 0;
   };
-  enum class Going : int64_t { On, Failed, Finished };
+  /// What has come from a rank.
+  struct Landing {
+    Bytes memory;
+    uint8_t *data = nullptr;
+    int64_t bytes = 0;
+  };
+  /// What a rank says in a meeting; all that go on say the same.
+  enum class Going : int64_t { On, Failed, Finished, Begin };
+  /// What a piece of state has held.
+  struct Kept {
+    bool cleared = false;
+    Bytes bytes; ///< If it was not clear.
+  };
 
   void callTransport(const std::vector<const void *> &send,
                      const std::vector<int64_t> &sendBytes,
@@ -81,21 +118,46 @@ private:
                      const std::vector<int64_t> &receiveBytes);
   std::vector<int64_t> meet(Going going, const std::vector<int64_t> &bytes,
                             pikort_rank_totals own = {});
-  std::vector<Bytes> swap(const std::vector<Piece> &pieces);
+  /// Where records shall lie in what comes: after so many bytes, and at
+  /// multiples of their size from another one.
+  struct Placement {
+    const uint8_t *like = nullptr;
+    int64_t after = 0, size = 1;
+  };
+  std::vector<Landing> swap(const std::vector<Piece> &pieces,
+                            Placement placement);
+  std::vector<Landing> swap(const std::vector<Piece> &pieces) {
+    return swap(pieces, {});
+  }
+  Landing land(int64_t bytes, const Placement &placement);
+  bool isDivided(const Source &source) const;
   [[noreturn]] void agreeOnError();
+  [[noreturn]] void breakOff(const std::string &why);
   Traffic &trafficOf(const std::string &from, const std::string &to);
 
+  void balanceOwners();
+  void findCommonMemory();
+  void dropCommonMemory();
+
   void shareFirst(State &state, int64_t bytes);
-  void shareOwned(State &state, const Stage &stage, bool toFirst);
-  void shareChanges(State &state, Bytes &kept, bool toFirst);
+  void shareOwned(int32_t state, const Stage &stage, bool toFirst);
+  void shareChanges(State &state, const Kept &kept, int64_t elements,
+                    const Stage *owners, bool toFirst);
   void count(State &state, const std::vector<Piece> &pieces);
 
   pikort_pipeline &p_;
   pikort_ranks transport_;
+  Owners owners_;
   int64_t meetings_ = 0;
   bool agreed_ = false; ///< This run has ended for all.
   std::string broken_;  ///< Why no meeting is possible any more.
-  std::map<int32_t, Bytes> kept_;
+  CommonMemory common_;
+  int64_t commonBytes_ = -1;                 ///< That were looked for last.
+  std::map<int32_t, int64_t> commonOffsets_; ///< Of states.
+  /// Cleared in this rank's bins alone.
+  std::set<int32_t> sparse_;
+  std::map<int32_t, Kept> kept_;
+  std::map<int32_t, Array<uint32_t>> sourceBuckets_;
   std::vector<SharedField> fields_;
 };
 

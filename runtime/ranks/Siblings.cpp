@@ -51,6 +51,7 @@ void Siblings::bind(Sibling &sibling) {
   check(sibling, pikort_set_memory_budget(to, first_.memory.budget()));
   to->wantedThreads = first_.wantedThreads;
   to->loopLimit = first_.loopLimit;
+  to->rankOwners = first_.rankOwners;
   for (size_t s = 0; s < first_.states.size(); ++s) {
     const State &state = first_.states[s];
     if (!state.bound || state.internal)

@@ -147,6 +147,23 @@ TEST_F(Ranks, Refusals) {
   EXPECT_EQ(pikort_make_thread_ranks(0, &ranks), PIKORT_INVALID_ARGUMENT);
 }
 
+// Who owns which bins is no result; what cannot be is said.
+TEST_F(Ranks, Owners) {
+  EXPECT_EQ(messageOf(pikort_set_rank_owners(pipe.get(), 5)),
+            "pipeline 'Sums': expected a way to find owners of bins, but got "
+            "5");
+  ASSERT_EQ(pikort_set_rank_owners(pipe.get(), PIKORT_OWNERS_LOAD), PIKORT_OK);
+  ASSERT_EQ(pikort_set_thread_ranks(pipe.get(), 3), PIKORT_OK);
+  EXPECT_TRUE(pipe.run());
+  EXPECT_EQ(sum[0], 1000 + 5050);
+  setenv("PIKO_RANK_OWNERS", "mine", 1);
+  EXPECT_EQ(messageOf(pikort_run(pipe.get())),
+            "PIKO_RANK_OWNERS: expected pattern, blocks, morton or load, but "
+            "got 'mine'");
+  unsetenv("PIKO_RANK_OWNERS");
+  EXPECT_TRUE(pipe.run());
+}
+
 // A network that fails ends this run and all later ones.
 TEST_F(Ranks, BrokenNetwork) {
   pikort_ranks ranks{1, 2, nullptr,

@@ -79,6 +79,8 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   {
     OpPassManager &pipeline = passes.nest<PipelineOp>();
     pipeline.addPass(createOrderStages());
+    if (options.ranks)
+      pipeline.addPass(createBinUpdates());
     if (options.has("prune"))
       pipeline.addPass(createPruneUnreached());
     if (options.has("pre-schedule"))

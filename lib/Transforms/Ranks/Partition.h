@@ -9,18 +9,34 @@
 
 namespace piko {
 
-enum class Division {
-  First, ///< The first rank alone.
-  Parts, ///< Each rank what it has been fed, or has emitted.
-  Bins   ///< Each rank the bins that it owns.
+struct StageDivision {
+  RankDivision division = RankDivision::First;
+  RankOwners owners = RankOwners::Pattern;
 };
 
 /// By stage.
-using Divisions = llvm::DenseMap<mlir::Operation *, Division>;
+using Divisions = llvm::DenseMap<mlir::Operation *, StageDivision>;
 
-/// Puts `piko.keep` and `piko.share` into a program where ranks use state that
-/// others have written.
+/// Whether an access to state is to pixels of the call's bin.
+bool isInBin(mlir::Operation *access);
+
+/// Whether bins of both stages that are at one place have one owner.
+bool haveSameOwners(StageOp a, StageOp b, const Divisions &divisions);
+
+/// Puts `piko.keep`, `piko.share` and `piko.common` into a program where ranks
+/// use state that others have written.
 void shareState(ProgramOp program, const Divisions &divisions);
+
+//===----------------------------------------------------------------------===//
+// What costs less: to compute, or to send (TransferCost.cpp)
+//===----------------------------------------------------------------------===//
+
+/// Whether each rank computes what a kernel stores in less time than it takes
+/// to bring it there from the rank that has computed it.
+bool isCheaperThanItsStores(KernelOp kernel);
+
+/// The same of the bins that the AssignBin of a source finds.
+bool isCheaperThanItsBins(KernelOp kernel);
 
 } // namespace piko
 

@@ -9,6 +9,9 @@
 
 #include "Ranks/Partition.h"
 
+#include "Support/StateAccess.h"
+
+#include "Piko/Analysis/OrderFacts.h"
 #include "Piko/Analysis/ProgramPlan.h"
 #include "Piko/Analysis/StageGraph.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
@@ -42,17 +45,31 @@ public:
   void setKeys();
 
   Divisions divisions;
-  unsigned divided = 0, exchanges = 0;
+  unsigned divided = 0, replicated = 0, exchanges = 0;
 
 private:
   void divide(LaunchOp launch);
-  void exchange(OpOperand &operand, Division to);
+  void divide(WavesOp waves);
+  void set(LaunchOp launch, RankDivision division, const std::string &why);
+  std::string whyNotDivided(LaunchOp launch);
+  bool isReplicated(LaunchOp launch, RankDivision division);
+  void findRankOrder();
+  void exchange(OpOperand &operand, RankDivision to);
+  void exchangeBins(OpOperand &operand, LaunchOp assign, RankDivision to);
+  bool keepsBin(EdgeOp edge);
   bool staysInBin(EdgeOp edge);
+  RankDivision findDivision(ArrayRef<LaunchOp> loop, std::string &why);
+  RankDivision divisionOf(StageOp stage) {
+    return divisions.lookup(stage).division;
+  }
 
   ProgramOp program;
   PipelineOp pipeline;
   OpBuilder builder;
-  llvm::DenseSet<Operation *> exchanged; ///< Edges of the pipeline.
+  llvm::DenseSet<Operation *> exchanged; ///< Edges of the pipeline, with keys.
+  /// Stages divided by the primitives of this one source: what a rank emits is
+  /// before what the next one does.
+  llvm::DenseMap<Operation *, Operation *> rankOrder;
 };
 
 } // namespace
@@ -77,21 +94,43 @@ void Partitioner::takeStripsApart() {
 // Who runs a kernel
 //===----------------------------------------------------------------------===//
 
-/// What shows, in a kernel, in which order all calls of a stage run.
-static std::string whyShowsOrder(KernelOp kernel) {
+/// What shows, in kernels, in which order all calls of their stages run.
+static std::string whyShowsOrder(ArrayRef<LaunchOp> launches) {
   std::string reason;
   llvm::DenseMap<std::pair<Attribute, Attribute>, AtomicKind> kinds;
-  kernel.walk([&](AtomicOp atomic) {
-    auto [known, isNew] = kinds.try_emplace(
-        {atomic.getStateAttr(), atomic.getFieldAttr()}, atomic.getKind());
-    if (atomic.getOld())
-      reason = "it uses what an atomic operation returns";
-    else if (atomic.getKind() == AtomicKind::AddF)
-      reason = "it adds floats, whose sum depends on the order";
-    else if (known->second != atomic.getKind())
-      reason = "it changes one field by two kinds of atomic operations";
-  });
+  for (LaunchOp launch : launches)
+    launch.getKernelOp().walk([&](AtomicOp atomic) {
+      auto [known, isNew] = kinds.try_emplace(
+          {atomic.getStateAttr(), atomic.getFieldAttr()}, atomic.getKind());
+      if (atomic.getOld())
+        reason = "it uses what an atomic operation returns";
+      else if (atomic.getKind() == AtomicKind::AddF)
+        reason = "it adds floats, whose sum depends on the order";
+      else if (known->second != atomic.getKind())
+        reason = "it changes one field by two kinds of atomic operations";
+    });
   return reason;
+}
+
+/// Whether a loop reads what it writes elsewhere than in the bin of a call:
+/// ranks see that at its end alone.
+static bool readsOwnState(ArrayRef<LaunchOp> launches) {
+  llvm::DenseMap<Attribute, int> kinds;
+  llvm::DenseSet<Attribute> elsewhere;
+  for (LaunchOp launch : launches)
+    launch.getKernelOp().walk([&](Operation *op) {
+      auto [state, access] = getStateAccess(op);
+      if (!state)
+        return;
+      kinds[state] |= access;
+      if (!isInBin(op))
+        elsewhere.insert(state);
+    });
+  return llvm::any_of(kinds, [&](const auto &state) {
+    return (state.second & StateAccess::reads) &&
+           (state.second & ~StateAccess::reads) &&
+           elsewhere.contains(state.first);
+  });
 }
 
 /// Whether all that comes to a stage is of one source, of which each rank has
@@ -122,98 +161,267 @@ static std::string whyNotParts(StageOp stage, KernelOp kernel) {
   return "";
 }
 
-void Partitioner::divide(LaunchOp launch) {
-  KernelOp kernel = launch.getKernelOp();
-  SmallVector<StageOp> stages = getStages(kernel);
-  if (stages.empty())
-    return;
-  StageOp stage = stages.front();
-  std::string why;
+/// Why a stage runs on the first rank, whatever its bins are.
+std::string Partitioner::whyNotDivided(LaunchOp launch) {
+  StageOp stage = getStages(launch.getKernelOp()).front();
   if (!pipeline.getOps<CheckRecordOp>().empty())
-    why = "the pipeline checks itself, in the order of one process";
-  else if (launch->getParentOp() != program)
-    why = "it is on a cycle";
-  else if (ScheduleOp schedule = stage.getSchedule();
-           schedule && schedule.getAfter())
-    why = "it follows another stage";
-  else
-    why = whyShowsOrder(kernel);
-  Division division = Division::First;
-  if (why.empty() && !stage.isWholeDomain()) {
-    division = Division::Bins;
-  } else if (why.empty()) {
-    why = whyNotParts(stage, kernel);
-    if (why.empty())
-      division = Division::Parts;
-  }
+    return "the pipeline checks itself, in the order of one process";
+  if (launch->getParentOfType<RoundsOp>())
+    return "it is on a cycle with stages that wait";
+  ScheduleOp schedule = stage.getSchedule();
+  if (schedule && schedule.getAfter())
+    return "it follows another stage";
+  return whyShowsOrder(launch);
+}
+
+/// Whether all ranks run what a kernel does for a source, because others need
+/// it and it would take longer to bring it to them. Nothing but state tells of
+/// such a kernel.
+bool Partitioner::isReplicated(LaunchOp launch, RankDivision division) {
+  KernelOp kernel = launch.getKernelOp();
+  auto join = launch.getInput().getDefiningOp<JoinOp>();
+  if (launch->getParentOp() != program || launch.getNumResults() > 0 || !join ||
+      division != RankDivision::Parts)
+    return false;
+  for (Value edge : join.getEdges())
+    if (!isa_and_nonnull<SourceOp>(getOrigin(edge)))
+      return false;
+  llvm::DenseSet<StringAttr> written = getWrittenState(kernel);
+  bool isNeeded = false;
+  program.walk([&](LaunchOp other) {
+    if (other != launch)
+      other.getKernelOp().walk([&](Operation *op) {
+        auto [state, kinds] = getStateAccess(op);
+        isNeeded |= state && written.contains(state.getAttr());
+      });
+  });
+  return isNeeded && isCheaperThanItsStores(kernel);
+}
+
+/// Neighbouring bins belong to one rank, as to one core.
+static RankOwners getOwners(StageOp stage) {
+  ScheduleOp schedule = stage.getSchedule();
+  return schedule && schedule.getKind() == ScheduleKind::DirectMap
+             ? RankOwners::Blocks
+             : RankOwners::Pattern;
+}
+
+void Partitioner::set(LaunchOp launch, RankDivision division,
+                      const std::string &why) {
+  SmallVector<StageOp> stages = getStages(launch.getKernelOp());
+  StageOp stage = stages.front();
+  bool isMapped =
+      division == RankDivision::Bins && getOwners(stage) != RankOwners::Pattern;
+  RankOwners owners =
+      division == RankDivision::Bins ? getOwners(stage) : RankOwners::Pattern;
   for (StageOp member : stages)
-    divisions[member] = division;
-  if (division == Division::First) {
+    divisions[member] = {division, owners};
+  if (division == RankDivision::First) {
     stage.emitRemark() << "stage '" << getCppName(stage)
                        << "' runs on the first rank alone: " << why;
     return;
   }
-  ++divided;
+  if (division == RankDivision::All) {
+    ++replicated;
+    stage.emitRemark() << "stage '" << getCppName(stage)
+                       << "' runs on each rank, as it costs more to send what "
+                          "it stores";
+  } else {
+    ++divided;
+  }
   builder.setInsertionPointToStart(program.getBodyBlock());
-  UnitAttr parts =
-      division == Division::Parts ? builder.getUnitAttr() : UnitAttr();
+  auto kind = RankDivisionAttr::get(builder.getContext(), division);
+  RankOwnersAttr mapped =
+      isMapped ? RankOwnersAttr::get(builder.getContext(), owners)
+               : RankOwnersAttr();
   for (StageOp member : llvm::reverse(stages))
     PartitionOp::create(builder, launch.getLoc(),
-                        FlatSymbolRefAttr::get(member.getSymNameAttr()), parts);
+                        FlatSymbolRefAttr::get(member.getSymNameAttr()), kind,
+                        mapped);
+}
+
+void Partitioner::divide(LaunchOp launch) {
+  SmallVector<StageOp> stages = getStages(launch.getKernelOp());
+  if (stages.empty())
+    return;
+  std::string why = whyNotDivided(launch);
+  RankDivision division = RankDivision::First;
+  if (why.empty() && !stages.front().isWholeDomain()) {
+    division = RankDivision::Bins;
+  } else if (why.empty()) {
+    why = whyNotParts(stages.front(), launch.getKernelOp());
+    if (why.empty())
+      division = RankDivision::Parts;
+  }
+  set(launch, isReplicated(launch, division) ? RankDivision::All : division,
+      why);
+}
+
+/// How a loop is divided that is several loops: each rank has the primitives
+/// that have come to it, and all that follow from them. That is so if all calls
+/// may run anywhere, and if all bins are of one size and nothing leaves its
+/// bin.
+RankDivision Partitioner::findDivision(ArrayRef<LaunchOp> loop,
+                                       std::string &why) {
+  why = whyShowsOrder(loop);
+  if (why.empty() && readsOwnState(loop))
+    why = "it is on a cycle that reads what it writes";
+  llvm::DenseSet<Operation *> members;
+  for (LaunchOp launch : loop) {
+    if (why.empty())
+      why = whyNotDivided(launch);
+    for (StageOp stage : getStages(launch.getKernelOp()))
+      members.insert(stage);
+  }
+  if (!why.empty())
+    return RankDivision::First;
+  StageOp first = getStages(LaunchOp(loop.front()).getKernelOp()).front();
+  if (!first.isWholeDomain()) {
+    for (auto edge : pipeline.getOps<EdgeOp>()) {
+      auto to = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+      if (!members.contains(
+              lookupInPipeline<StageOp>(edge, edge.getProducerAttr())) ||
+          (!members.contains(to) && isOrderIrrelevant(pipeline, to)))
+        continue;
+      if (to.getBins() != first.getBins() ||
+          getOwners(to) != getOwners(first) || !keepsBin(edge))
+        why = "it is on a cycle in which primitives come to other bins";
+    }
+    return why.empty() ? RankDivision::Bins : RankDivision::First;
+  }
+  for (LaunchOp launch : loop)
+    if (why.empty())
+      why = whyNotParts(getStages(launch.getKernelOp()).front(),
+                        launch.getKernelOp());
+  return why.empty() ? RankDivision::Parts : RankDivision::First;
+}
+
+void Partitioner::divide(WavesOp waves) {
+  SmallVector<LaunchOp> launches = llvm::to_vector(waves.getOps<LaunchOp>());
+  std::string why;
+  RankDivision division = findDivision(launches, why);
+  for (LaunchOp launch : llvm::reverse(launches))
+    set(launch, division, why);
 }
 
 void Partitioner::divide() {
-  SmallVector<LaunchOp> launches;
-  program.walk([&](LaunchOp launch) { launches.push_back(launch); });
-  for (LaunchOp launch : llvm::reverse(launches))
-    divide(launch);
+  SmallVector<Operation *> units; // launches, and loops as a whole
+  program.walk<WalkOrder::PreOrder>([&](Operation *op) {
+    bool isLoop = isa<WavesOp>(op) && !op->getParentOfType<RoundsOp>();
+    if (isLoop || isa<LaunchOp>(op))
+      units.push_back(op);
+    return isLoop ? WalkResult::skip() : WalkResult::advance();
+  });
+  for (Operation *unit : llvm::reverse(units))
+    if (auto waves = dyn_cast<WavesOp>(unit))
+      divide(waves);
+    else
+      divide(cast<LaunchOp>(unit));
+  findRankOrder();
+}
+
+/// Parts of a source are consecutive, and so is what follows from them.
+void Partitioner::findRankOrder() {
+  for (Operation &op : *program.getBodyBlock()) {
+    if (!isa<JoinOp, WavesOp>(op))
+      continue;
+    llvm::SmallPtrSet<Operation *, 2> roots;
+    for (Value edge : op.getOperands()) {
+      Operation *origin = getOrigin(edge);
+      auto from = dyn_cast_or_null<EdgeOp>(origin);
+      roots.insert(from ? rankOrder.lookup(lookupInPipeline<StageOp>(
+                              from, from.getProducerAttr()))
+                        : origin);
+    }
+    if (roots.size() != 1 || !*roots.begin())
+      continue;
+    auto note = [&](StageOp stage) {
+      if (divisionOf(stage) == RankDivision::Parts)
+        rankOrder[stage] = *roots.begin();
+    };
+    if (auto join = dyn_cast<JoinOp>(op)) {
+      for (Operation *user : join.getBins().getUsers())
+        if (auto launch = dyn_cast<LaunchOp>(user))
+          llvm::for_each(getStages(launch.getKernelOp()), note);
+    } else {
+      for (auto launch : cast<WavesOp>(op).getOps<LaunchOp>())
+        llvm::for_each(getStages(launch.getKernelOp()), note);
+    }
+  }
 }
 
 //===----------------------------------------------------------------------===//
 // Edges between ranks
 //===----------------------------------------------------------------------===//
 
-/// Whether what comes along an edge is in the bin in which it was emitted, so
-/// that its owner has it.
-bool Partitioner::staysInBin(EdgeOp edge) {
-  auto from = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
-  auto to = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
-  if (divisions.lookup(from) != Division::Bins ||
-      from.getBins() != to.getBins())
-    return false;
-  bool stays = true, isAssigned = false;
+bool piko::haveSameOwners(StageOp a, StageOp b, const Divisions &divisions) {
+  return a.getBins() == b.getBins() &&
+         divisions.lookup(a).owners == divisions.lookup(b).owners;
+}
+
+/// Whether what comes along an edge is in the bin in which it was emitted.
+bool Partitioner::keepsBin(EdgeOp edge) {
+  bool keeps = true, isAssigned = false;
   pipeline.walk([&](AssignOp assign) {
     if (assign.getStageAttr() != edge.getConsumerAttr())
       return;
     isAssigned = true;
-    assign.walk([&](AssignmentOpInterface op) { stays &= op.keepsBin(); });
+    assign.walk([&](AssignmentOpInterface op) { keeps &= op.keepsBin(); });
   });
-  return stays && isAssigned;
+  return keeps && isAssigned;
 }
 
-void Partitioner::exchange(OpOperand &operand, Division to) {
+/// Whether its owner has it, too.
+bool Partitioner::staysInBin(EdgeOp edge) {
+  auto from = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
+  auto to = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
+  return divisionOf(from) == RankDivision::Bins &&
+         haveSameOwners(from, to, divisions) && keepsBin(edge);
+}
+
+/// Who looks at all primitives of a source finds those of its own bins. Where
+/// that takes long each rank finds the bins of a part.
+void Partitioner::exchangeBins(OpOperand &operand, LaunchOp assign,
+                               RankDivision to) {
+  if (to != RankDivision::Bins || isCheaperThanItsBins(assign.getKernelOp()))
+    return;
+  builder.setInsertionPoint(operand.getOwner());
+  Value value = operand.get();
+  operand.set(
+      ExchangeOp::create(builder, assign.getLoc(), value.getType(), value));
+  ++exchanges;
+}
+
+void Partitioner::exchange(OpOperand &operand, RankDivision to) {
+  if (auto assign = operand.get().getDefiningOp<LaunchOp>();
+      assign && getAssignedSource(assign.getKernelOp()))
+    return exchangeBins(operand, assign, to);
   auto edge = dyn_cast_or_null<EdgeOp>(getOrigin(operand.get()));
-  if (!edge || to == Division::Parts)
+  if (!edge || to == RankDivision::Parts)
     return;
   auto producer = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
-  Division from = divisions.lookup(producer);
-  if ((to == Division::First && from == Division::First) || staysInBin(edge))
+  RankDivision from = divisionOf(producer);
+  if ((to == RankDivision::First && from == RankDivision::First) ||
+      staysInBin(edge))
     return;
   builder.setInsertionPoint(operand.getOwner());
   Value value = operand.get();
   operand.set(
       ExchangeOp::create(builder, edge.getLoc(), value.getType(), value));
   ++exchanges;
-  if (from != Division::First)
+  if (from != RankDivision::First && !rankOrder.contains(producer))
     exchanged.insert(edge);
 }
 
 void Partitioner::exchange() {
   for (Operation &op : llvm::make_early_inc_range(*program.getBodyBlock())) {
-    Division to = Division::First; // of cycles
+    RankDivision to = RankDivision::First; // of cycles that are not divided
     if (auto join = dyn_cast<JoinOp>(op))
-      to = divisions.lookup(join.getStageOp());
-    else if (!isa<WavesOp, RoundsOp>(op))
+      to = divisionOf(join.getStageOp());
+    else if (auto waves = dyn_cast<WavesOp>(op))
+      to = divisionOf(
+          getStages((*waves.getOps<LaunchOp>().begin()).getKernelOp()).front());
+    else if (!isa<RoundsOp>(op))
       continue;
     for (OpOperand &operand : op.getOpOperands())
       exchange(operand, to);
@@ -226,8 +434,8 @@ void Partitioner::exchange() {
 
 void Partitioner::setKeys() {
   llvm::DenseSet<Operation *> divided;
-  for (auto [stage, division] : divisions)
-    if (division != Division::First)
+  for (const auto &[stage, how] : divisions)
+    if (how.division != RankDivision::First)
       divided.insert(stage);
   ProgramPlan plan(pipeline, {&exchanged, &divided});
   program.walk([&](JoinOp join) {
@@ -269,5 +477,6 @@ void PartitionProgramPass::runOnOperation() {
   partitioner.setKeys();
   shareState(program, partitioner.divisions);
   divided += partitioner.divided;
+  replicated += partitioner.replicated;
   exchanges += partitioner.exchanges;
 }

@@ -36,6 +36,15 @@ struct Written {
   bool onlyAtomics = false;
 };
 
+/// Over all statements so far.
+struct History {
+  bool isClear = true; ///< Nothing has changed it in this run.
+  /// Whether each pixel is used by who owns its bin alone; a stage with such
+  /// bins.
+  bool isCommon = true;
+  StageOp owner;
+};
+
 class StateSharer {
 public:
   StateSharer(ProgramOp program, const Divisions &divisions)
@@ -47,22 +56,25 @@ public:
 private:
   void visit(Operation *statement);
   void use(Operation *statement, Attribute state, const Use &use,
-           Division division, StageOp stage);
+           RankDivision division, StageOp stage);
   bool continues(const Written &before, const Use &use, Way way,
-                 Division division, StageOp stage);
-  void share(Attribute state, bool atEnd);
+                 RankDivision division, StageOp stage);
+  void share(Attribute state, bool atEnd, StageOp to = {});
   bool outlivesRun(Attribute state);
+  void note(Attribute state, bool writes, bool isOwners, StageOp stage);
+  void declareCommon();
 
   ProgramOp program;
   PipelineOp pipeline;
   const Divisions &divisions;
   OpBuilder builder;
   llvm::MapVector<Attribute, Written> written;
+  llvm::MapVector<Attribute, History> histories;
 };
 
 } // namespace
 
-static bool isInBin(Operation *access) {
+bool piko::isInBin(Operation *access) {
   if (isa<UpdateOp>(access))
     return true; // by its rule
   return isa<LoadOp, StoreOp>(access) && access->hasAttr(marks::inside) &&
@@ -93,14 +105,19 @@ bool StateSharer::outlivesRun(Attribute state) {
   return buffer && !buffer.getPerSource();
 }
 
-void StateSharer::share(Attribute state, bool atEnd) {
+/// `to`, if not null: whose owners alone will use its pixels.
+void StateSharer::share(Attribute state, bool atEnd, StageOp to) {
   Written now = std::exchange(written[state], {});
   auto name = cast<FlatSymbolRefAttr>(state);
   bool toFirst = atEnd && !outlivesRun(state);
+  bool toOwners = to && now.way == Way::Anywhere &&
+                  lookupInPipeline<ImageOp>(program, name);
   if (now.way == Way::Clean || (now.way == Way::FirstRank && toFirst))
     return;
   FlatSymbolRefAttr owner;
-  if (now.way == Way::Owners)
+  if (toOwners)
+    now.stage = to;
+  if (now.way == Way::Owners || toOwners)
     owner = FlatSymbolRefAttr::get(now.stage.getSymNameAttr());
   SmallVector<Attribute> reduce;
   if (now.way == Way::Anywhere)
@@ -113,25 +130,30 @@ void StateSharer::share(Attribute state, bool atEnd) {
   };
   ShareOp::create(builder, program.getLoc(), name, owner,
                   unit(now.way == Way::FirstRank), unit(toFirst),
+                  unit(toOwners),
                   reduce.empty() ? ArrayAttr() : builder.getArrayAttr(reduce));
+  if (toOwners) {
+    written[state].way = Way::Owners;
+    written[state].stage = to;
+  }
 }
 
 /// Whether a statement may use the state as it is on each rank, because it uses
 /// it as the statements before it did.
 bool StateSharer::continues(const Written &before, const Use &use, Way way,
-                            Division division, StageOp stage) {
+                            RankDivision division, StageOp stage) {
   switch (before.way) {
   case Way::Clean:
     return true;
   case Way::FirstRank:
-    return division == Division::First;
+    return division == RankDivision::First;
   case Way::Owners:
-    return division == Division::Bins && use.staysInBin &&
-           StageOp(before.stage).getBins() == stage.getBins();
+    return division == RankDivision::Bins && use.staysInBin &&
+           haveSameOwners(before.stage, stage, divisions);
   case Way::Anywhere:
     // Changes of one kind are combined, however many kernels make them.
-    return division != Division::First && before.onlyAtomics &&
-           use.kinds == StateAccess::changesAtomically &&
+    return division != RankDivision::First && division != RankDivision::All &&
+           before.onlyAtomics && use.kinds == StateAccess::changesAtomically &&
            llvm::all_of(use.atomics, [&](const auto &atomic) {
              auto known = before.atomics.find(atomic.first);
              return known == before.atomics.end() ||
@@ -141,22 +163,38 @@ bool StateSharer::continues(const Written &before, const Use &use, Way way,
   return false;
 }
 
+void StateSharer::note(Attribute state, bool writes, bool isOwners,
+                       StageOp stage) {
+  History &history = histories[state];
+  history.isClear &= !writes;
+  if (!history.owner)
+    history.owner = stage;
+  history.isCommon &=
+      isOwners && haveSameOwners(history.owner, stage, divisions);
+}
+
 void StateSharer::use(Operation *statement, Attribute state, const Use &use,
-                      Division division, StageOp stage) {
+                      RankDivision division, StageOp stage) {
   builder.setInsertionPoint(statement);
   bool writes = use.kinds & ~StateAccess::reads;
-  Way way = !writes                                        ? Way::Clean
-            : division == Division::First                  ? Way::FirstRank
-            : division == Division::Bins && use.staysInBin ? Way::Owners
-                                                           : Way::Anywhere;
-  if (!continues(written[state], use, way, division, stage))
-    share(state, /*atEnd=*/false);
-  if (!writes)
+  bool isOwners = division == RankDivision::Bins && use.staysInBin;
+  Way way = !writes || division == RankDivision::All ? Way::Clean
+            : division == RankDivision::First        ? Way::FirstRank
+            : isOwners                               ? Way::Owners
+                                                     : Way::Anywhere;
+  // What is not the same on all ranks would be written to by all.
+  bool isMixed =
+      division == RankDivision::All && written[state].way != Way::Clean;
+  if (isMixed || !continues(written[state], use, way, division, stage))
+    share(state, /*atEnd=*/false, isOwners ? stage : StageOp());
+  bool isCleared = histories[state].isClear && !outlivesRun(state);
+  note(state, writes, isOwners, stage);
+  if (way == Way::Clean)
     return;
   Written &now = written[state];
   if (way == Way::Anywhere && now.way == Way::Clean) {
-    KeepOp::create(builder, statement->getLoc(),
-                   cast<FlatSymbolRefAttr>(state));
+    KeepOp::create(builder, statement->getLoc(), cast<FlatSymbolRefAttr>(state),
+                   isCleared ? builder.getUnitAttr() : UnitAttr());
     now.onlyAtomics = use.kinds == StateAccess::changesAtomically;
   }
   now.way = way;
@@ -167,21 +205,38 @@ void StateSharer::use(Operation *statement, Attribute state, const Use &use,
 
 void StateSharer::visit(Operation *statement) {
   Uses uses;
-  Division division = Division::First; // of cycles
+  RankDivision division = RankDivision::First; // of rounds
   StageOp stage;
   statement->walk([&](LaunchOp launch) {
     KernelOp kernel = launch.getKernelOp();
     addUses(kernel, uses);
     if (SmallVector<StageOp> stages = getStages(kernel); !stages.empty()) {
       stage = stages.front();
-      if (launch == statement)
-        division = divisions.lookup(stage);
+      if (!isa<RoundsOp>(statement))
+        division = divisions.lookup(stage).division;
     } else if (launch == statement) {
-      division = Division::Parts; // AssignBin of a source, which only reads
+      division = RankDivision::Parts; // AssignBin of a source, which only reads
     }
   });
   for (const auto &[state, used] : uses)
     use(statement, state, used, division, stage);
+}
+
+/// Ranks that share memory need not send these.
+void StateSharer::declareCommon() {
+  for (const auto &[state, history] : histories) {
+    auto name = cast<FlatSymbolRefAttr>(state);
+    if (!history.isCommon || written.lookup(state).way != Way::Owners ||
+        !lookupInPipeline<ImageOp>(program, name))
+      continue;
+    Operation *last = nullptr;
+    for (auto partition : program.getBodyBlock()->getOps<PartitionOp>())
+      last = partition;
+    builder.setInsertionPointAfter(last);
+    CommonOp::create(
+        builder, program.getLoc(), name,
+        FlatSymbolRefAttr::get(StageOp(history.owner).getSymNameAttr()));
+  }
 }
 
 void StateSharer::run() {
@@ -195,6 +250,8 @@ void StateSharer::run() {
   SmallVector<Attribute> states;
   for (const auto &[state, now] : written)
     states.push_back(state);
+  declareCommon();
+  builder.setInsertionPointToEnd(program.getBodyBlock());
   for (Attribute state : states)
     share(state, /*atEnd=*/true);
 }

@@ -445,6 +445,19 @@ static void concatenateBuckets(pikort_pipeline &p, Kernel &kernel, size_t port,
               reinterpret_cast<uint8_t *>(stream.pairStorage.data()));
 }
 
+Stream piko::rt::gatherBuckets(pikort_pipeline &p, int32_t index) {
+  Stream stream;
+  Kernel &kernel = *cpuOf(p).sourceKernels[index];
+  if (kernel.open || kernel.pendingOutputs == 0)
+    throw Failure{PIKORT_BAD_PROGRAM,
+                  "stage " + quoted(p.stages[kernel.stage].name) +
+                      ": expected the bins of source " + std::to_string(index) +
+                      " to be assigned before"};
+  concatenateBuckets(p, kernel, 0, stream);
+  releasePort(kernel, 0);
+  return stream;
+}
+
 static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
                            int32_t index) {
   Source &source = p.sources[index];
@@ -454,18 +467,20 @@ static Stream gatherSource(pikort_pipeline &p, const Stage &stage,
   stream.keys.width = 1;
   stream.keys.base = (static_cast<uint64_t>(index) << 32) +
                      static_cast<uint64_t>(source.begin);
-  if (stage.placed()) {
-    Kernel &kernel = *cpuOf(p).sourceKernels[index];
-    if (kernel.open || kernel.pendingOutputs == 0)
-      throw Failure{PIKORT_BAD_PROGRAM, "stage " + quoted(stage.name) +
-                                            ": expected the bins of source " +
-                                            std::to_string(index) +
-                                            " to be assigned before"};
-    concatenateBuckets(p, kernel, 0, stream);
-    releasePort(kernel, 0);
-    if (p.ranks)
-      p.ranks->filter(stage, stream, stream.pairStorage);
+  if (!stage.placed())
+    return stream;
+  if (p.ranks && p.ranks->takeBuckets(index, stream.pairStorage)) {
+    stream.pairs = stream.pairStorage.data();
+    stream.pairCount = stream.pairStorage.size();
+    return stream;
   }
+  Stream found = gatherBuckets(p, index);
+  stream.pairs = found.pairs;
+  stream.pairCount = found.pairCount;
+  stream.pairStorage = std::move(found.pairStorage);
+  stream.blocks = std::move(found.blocks);
+  if (p.ranks)
+    p.ranks->filter(stage, stream, stream.pairStorage);
   return stream;
 }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <numeric>
 
 using namespace piko::rt;
 
@@ -47,7 +48,11 @@ static void allocate(pikort_pipeline &p, State &state) {
     overflow |= __builtin_mul_overflow(bytes, extent, &bytes);
   if (overflow)
     throw OutOfMemory{INT64_MAX};
-  if (!state.owned || state.owned.size() != bytes) {
+  if (uint8_t *common = p.ranks ? p.ranks->commonMemory(state) : nullptr) {
+    if (state.owned.data() != common)
+      state.own(Array<uint8_t>::borrow(common, bytes));
+  } else if (!state.owned || state.owned.size() != bytes ||
+             state.owned.isBorrowed()) {
     state.own({}); // before the new one, so that both need not fit
     state.own(Array<uint8_t>(p.memory, bytes, Use::State));
   }
@@ -68,6 +73,8 @@ static void prepare(pikort_pipeline &p, State &state) {
 
 void piko::rt::prepareState(pikort_pipeline &p) {
   cpuOf(p).cleared.assign(p.stages.size(), false);
+  if (p.ranks)
+    p.ranks->prepareRun();
   for (State &state : p.states)
     try {
       prepare(p, state);
@@ -155,6 +162,14 @@ static void fillBins(pikort_pipeline &p, const Stage &stage, State &state,
   });
 }
 
+/// Those of some bins that this rank owns.
+static std::vector<int64_t> findOwned(const pikort_pipeline &p,
+                                      const Stage &stage,
+                                      std::vector<int64_t> bins) {
+  std::erase_if(bins, [&](int64_t bin) { return !p.ranks->owns(stage, bin); });
+  return bins;
+}
+
 void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
   const Stage &stage = p.stages[kernel.stage];
   if (stage.clears.empty() || cpuOf(p).cleared[kernel.stage])
@@ -162,15 +177,29 @@ void piko::rt::beginClears(pikort_pipeline &p, Kernel &kernel) {
   Part before = p.profile.part();
   p.profile.enter(Part::State);
   std::vector<int64_t> left = findLeftBins(p, stage, kernel);
-  std::vector<BinRun> runs = findRuns(stage, left);
   for (int32_t id : stage.clears)
-    if (static_cast<int64_t>(left.size()) == stage.bins())
+    if (p.ranks && p.ranks->clearsOwnedOnly(stage, id))
+      fillBins(p, stage, p.states[id],
+               findRuns(stage, findOwned(p, stage, left)));
+    else if (static_cast<int64_t>(left.size()) == stage.bins())
       fill(p, p.states[id]);
     else
-      fillBins(p, stage, p.states[id], runs);
+      fillBins(p, stage, p.states[id], findRuns(stage, left));
   cpuOf(p).cleared[kernel.stage] = true;
   kernel.input.clears = 1;
   p.profile.enter(before);
+}
+
+/// When a run begins.
+static void clear(pikort_pipeline &p, int32_t id) {
+  State &state = p.states[id];
+  const Stage *stage =
+      state.commonStage < 0 ? nullptr : &p.stages[state.commonStage];
+  if (!p.ranks || !stage || !p.ranks->clearsOwnedOnly(*stage, id))
+    return fill(p, state);
+  std::vector<int64_t> bins(static_cast<size_t>(stage->bins()));
+  std::iota(bins.begin(), bins.end(), 0);
+  fillBins(p, *stage, state, findRuns(*stage, findOwned(p, *stage, bins)));
 }
 
 void piko::rt::endClears(pikort_pipeline &p) {
@@ -195,7 +224,7 @@ void pikoir_clear(pikort_pipeline *p, int32_t id) {
                         std::to_string(id)};
     Part before = p->profile.part();
     p->profile.enter(Part::State);
-    fill(*p, *state);
+    clear(*p, id);
     p->profile.enter(before);
   });
 }

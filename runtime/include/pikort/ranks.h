@@ -54,6 +54,19 @@ PIKORT_API int32_t pikort_set_ranks(pikort_pipeline *pipeline,
 PIKORT_API int32_t pikort_set_thread_ranks(pikort_pipeline *pipeline,
                                            int32_t count);
 
+/// Which bins belong to one rank.
+enum pikort_owners {
+  PIKORT_OWNERS_DEFAULT = 0, ///< As the program says of each stage.
+  PIKORT_OWNERS_PATTERN = 1, ///< Neighbours have different owners.
+  PIKORT_OWNERS_BLOCKS = 2,  ///< Neighbours have one owner, row by row.
+  PIKORT_OWNERS_MORTON = 3,  ///< The same, along a Morton curve.
+  /// The same, each with as many of the primitives of the run before.
+  PIKORT_OWNERS_LOAD = 4
+};
+/// For later runs; all ranks say the same. No result depends on it.
+PIKORT_API int32_t pikort_set_rank_owners(pikort_pipeline *pipeline,
+                                          int32_t owners);
+
 /// What a rank has sent to others, over all runs since the latest reset.
 typedef struct pikort_rank_traffic {
   const char *from; ///< A stage; null: `to` is a piece of state.

@@ -30,3 +30,9 @@ int32_t piko::getNumber(Operation *region, bool asCycle) {
       });
   return number;
 }
+
+int32_t piko::getSourceNumber(SourceOp source) {
+  auto all = getPipeline(source).getOps<SourceOp>();
+  return static_cast<int32_t>(
+      std::distance(all.begin(), llvm::find(all, source)));
+}

@@ -21,6 +21,8 @@ llvm::SmallSetVector<int32_t, 8> findStages(mlir::Operation *region,
 /// The number of a region among those that the runtime counts with it: strips,
 /// waves, or cycles. Cycles are waves and rounds that are not part of others.
 int32_t getNumber(mlir::Operation *region, bool asCycle = false);
+/// The number of a source among those of its pipeline.
+int32_t getSourceNumber(SourceOp source);
 
 /// NAME.setup, which declares the pipeline to the runtime.
 mlir::func::FuncOp createSetup(ProgramOp program,

@@ -172,12 +172,20 @@ void RunWriter::createRankStatement(Operation &statement) {
   };
   Value status;
   if (auto exchange = dyn_cast<ExchangeOp>(statement)) {
-    auto edge = cast<EdgeOp>(getOrigin(exchange.getEdge()));
-    status = call(PIKO_RUNTIME_FUNCTION(pikoir_exchange),
-                  {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
-                   i32(edge.getPort())});
+    Operation *origin = getOrigin(exchange.getEdge());
+    if (auto source = dyn_cast<SourceOp>(origin)) {
+      status = call(PIKO_RUNTIME_FUNCTION(pikoir_exchange_source),
+                    {i32(getSourceNumber(source))});
+    } else {
+      auto edge = cast<EdgeOp>(origin);
+      status =
+          call(PIKO_RUNTIME_FUNCTION(pikoir_exchange),
+               {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
+                i32(edge.getPort())});
+    }
   } else if (auto keep = dyn_cast<KeepOp>(statement)) {
-    status = call(PIKO_RUNTIME_FUNCTION(pikoir_keep),
+    status = call(keep.getCleared() ? PIKO_RUNTIME_FUNCTION(pikoir_keep_cleared)
+                                    : PIKO_RUNTIME_FUNCTION(pikoir_keep),
                   {numberOf(keep.getStateAttr())});
   } else if (auto share = dyn_cast<ShareOp>(statement)) {
     FlatSymbolRefAttr name = share.getStateAttr();
@@ -201,7 +209,8 @@ void RunWriter::createRankStatement(Operation &statement) {
              {numberOf(name),
               i32(stage ? int64_t(numbers.stages.lookup(stage.getAttr())) : -1),
               i32((share.getFromFirst() ? PIKOIR_SHARE_FROM_FIRST : 0) |
-                  (share.getToFirst() ? PIKOIR_SHARE_TO_FIRST : 0))});
+                  (share.getToFirst() ? PIKOIR_SHARE_TO_FIRST : 0) |
+                  (share.getToOwners() ? PIKOIR_SHARE_TO_OWNERS : 0))});
   }
   if (status)
     check(status, createBlock(exit));

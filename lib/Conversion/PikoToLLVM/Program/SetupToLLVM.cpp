@@ -360,17 +360,34 @@ void SetupWriter::declareRegion(Operation *region) {
 
 /// Who runs which stage, in the order of launches, and what is exchanged.
 void SetupWriter::declareRanks(ProgramOp program) {
-  llvm::DenseMap<int32_t, int64_t> ways;
-  for (auto partition : program.getBodyBlock()->getOps<PartitionOp>())
-    ways[numbers.stages.lookup(partition.getStageAttr().getAttr())] =
-        partition.getParts() ? PIKOIR_PARTS : PIKOIR_BINS;
   if (!program.getRanks())
     return;
-  for (int32_t stage : findStages(program, numbers))
+  llvm::DenseMap<int32_t, PartitionOp> partitions;
+  for (auto partition : program.getBodyBlock()->getOps<PartitionOp>())
+    partitions[numbers.stages.lookup(partition.getStageAttr().getAttr())] =
+        partition;
+  for (int32_t stage : findStages(program, numbers)) {
+    PartitionOp partition = partitions.lookup(stage);
+    RankDivision division =
+        partition ? partition.getDivision() : RankDivision::First;
     call(PIKO_RUNTIME_FUNCTION(pikoir_declare_partition),
-         {i32(stage), i32(ways.lookup(stage))});
+         {i32(stage), i32(int64_t(division))});
+    if (partition && partition.getOwners())
+      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_owners),
+           {i32(stage), i32(int64_t(*partition.getOwners()))});
+  }
+  for (auto common : program.getBodyBlock()->getOps<CommonOp>())
+    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_common),
+         {i32(numbers.states.lookup(common.getImageAttr().getAttr())),
+          i32(numbers.stages.lookup(common.getStageAttr().getAttr()))});
   program.walk([&](ExchangeOp exchange) {
-    auto edge = cast<EdgeOp>(getOrigin(exchange.getEdge()));
+    Operation *origin = getOrigin(exchange.getEdge());
+    if (auto source = dyn_cast<SourceOp>(origin)) {
+      call(PIKO_RUNTIME_FUNCTION(pikoir_declare_exchange_source),
+           {i32(getSourceNumber(source))});
+      return;
+    }
+    auto edge = cast<EdgeOp>(origin);
     call(PIKO_RUNTIME_FUNCTION(pikoir_declare_exchange),
          {i32(numbers.stages.lookup(edge.getProducerAttr().getAttr())),
           i32(edge.getPort())});

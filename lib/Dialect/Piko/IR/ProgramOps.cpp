@@ -540,8 +540,8 @@ LogicalResult ProgramVerifier::checkAll(ProgramOp program) {
 LogicalResult ProgramOp::verifyRegions() {
   for (Operation &op : *getBodyBlock())
     if (!isa<ClearOp, FeedOp, ScheduleBinsOp, JoinOp, LaunchOp, WaitOp,
-             StripsOp, WavesOp, RoundsOp, PartitionOp, ExchangeOp, KeepOp,
-             ShareOp>(op))
+             StripsOp, WavesOp, RoundsOp, PartitionOp, CommonOp, ExchangeOp,
+             KeepOp, ShareOp>(op))
       return op.emitOpError("expected only statements of a program");
   for (Attribute name :
        getRootsAttr() ? getRootsAttr().getValue() : ArrayRef<Attribute>()) {

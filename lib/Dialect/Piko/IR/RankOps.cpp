@@ -10,14 +10,22 @@
 using namespace mlir;
 using namespace piko;
 
+#include "Piko/Dialect/Piko/IR/PikoProgramEnums.cpp.inc"
+
 LogicalResult PartitionOp::verify() {
   if (failed(verifyStage(*this, getStageAttr())))
     return failure();
   auto stage = lookupInPipeline<StageOp>(*this, getStageAttr());
-  if (getParts() && (!stage.isWholeDomain() || stage.getTakesList()))
+  RankDivision division = getDivision();
+  if (division == RankDivision::First)
+    return emitOpError("expected more than one rank to run a stage");
+  if (division == RankDivision::Parts &&
+      (!stage.isWholeDomain() || stage.getTakesList()))
     return emitOpError("expected a stage of one bin that takes no list, but "
                        "got ")
            << getStageAttr();
+  if (getOwners() && division != RankDivision::Bins)
+    return emitOpError("expected owners of bins alone");
   return success();
 }
 
@@ -30,7 +38,23 @@ static LogicalResult verifyMutable(Operation *op, FlatSymbolRefAttr name) {
          << name << ", which is none";
 }
 
-LogicalResult KeepOp::verify() { return verifyMutable(*this, getStateAttr()); }
+LogicalResult KeepOp::verify() {
+  if (failed(verifyMutable(*this, getStateAttr())))
+    return failure();
+  auto buffer = lookupInPipeline<BufferOp>(*this, getStateAttr());
+  if (getCleared() && buffer && !buffer.getPerSource())
+    return emitOpError("expected state that a run clears, but got ")
+           << getStateAttr();
+  return success();
+}
+
+LogicalResult CommonOp::verify() {
+  if (failed(verifyStage(*this, getStageAttr())))
+    return failure();
+  if (!lookupInPipeline<ImageOp>(*this, getImageAttr()))
+    return emitOpError("expected an image, but got ") << getImageAttr();
+  return success();
+}
 
 LogicalResult ShareOp::verify() {
   if (failed(verifyMutable(*this, getStateAttr())))
@@ -40,7 +64,11 @@ LogicalResult ShareOp::verify() {
   if (getStageAttr() && !lookupInPipeline<ImageOp>(*this, getStateAttr()))
     return emitOpError("expected an image, whose pixels bins own, but got ")
            << getStateAttr();
-  if (int(bool(getStageAttr())) + getFromFirst() + bool(getReduceAttr()) > 1)
+  if (getToOwners() && (!getStageAttr() || getToFirst()))
+    return emitOpError("expected the stage whose bins' owners it goes to");
+  if (int(getStageAttr() && !getToOwners()) + getFromFirst() +
+          bool(getReduceAttr()) >
+      1)
     return emitOpError("expected one way to bring ranks' changes together");
   ArrayAttr reduce = getReduceAttr();
   if (reduce && reduce.size() % 2 != 0)

@@ -7,6 +7,8 @@
 
 #include "Piko/Dialect/Piko/IR/Piko.h"
 
+#include "Piko/Dialect/Piko/IR/PikoProgramEnums.h.inc"
+
 #define GET_OP_CLASSES
 #include "Piko/Dialect/Piko/IR/PikoProgramOps.h.inc"
 

@@ -224,20 +224,41 @@ def Piko_WaitOp : Piko_ProgramStatement<"wait"> {
   let hasVerifier = 1;
 }
 
+/// As pikoir_partition has them, but for the first rank's.
+def Piko_Division : I32EnumAttr<"RankDivision", "which rank runs what of a stage", [
+  I32EnumAttrCase<"First", 0, "first">, // the first rank, all of it
+  I32EnumAttrCase<"Parts", 1, "parts">, // what each is fed, or has emitted
+  I32EnumAttrCase<"Bins", 2, "bins">,   // the bins that each owns
+  I32EnumAttrCase<"All", 3, "all">]> {  // each rank, all of it
+  let cppNamespace = "::piko";
+}
+
+/// As pikort_owners has them.
+def Piko_Owners : I32EnumAttr<"RankOwners", "which bins belong to one rank", [
+  I32EnumAttrCase<"Pattern", 1, "pattern">, // neighbours have different owners
+  I32EnumAttrCase<"Blocks", 2, "blocks">,   // neighbours, row by row
+  I32EnumAttrCase<"Morton", 3, "morton">,   // neighbours, along a Morton curve
+  I32EnumAttrCase<"Load", 4, "load">]> {    // as many primitives as in others
+  let cppNamespace = "::piko";
+}
+
 def Piko_PartitionOp : Piko_ProgramStatement<"partition"> {
   let summary = "which rank runs what of a stage";
   let description = [{
     Of a program that several processes, its ranks, run together. With `bins` a
     rank runs the bins that it owns; with `parts` what it has been fed or has
-    itself emitted, where all primitives are in one bin. A stage of which the
-    program does not say this is run by the first rank alone.
+    itself emitted, where all primitives are in one bin; with `all` each rank runs
+    all of the stage, so that what it writes is the same everywhere. A stage of
+    which the program does not say this is run by the first rank alone. `owners`
+    says which bins those of one rank are, where the host does not.
 
     ```mlir
-    piko.partition @rasterize bins
+    piko.partition @rasterize bins owners blocks
     ```
   }];
-  let arguments = (ins FlatSymbolRefAttr:$stage, UnitAttr:$parts);
-  let assemblyFormat = "$stage (`parts` $parts^) : (`bins`)? attr-dict";
+  let arguments = (ins FlatSymbolRefAttr:$stage, Piko_Division:$division,
+                       OptionalAttr<Piko_Owners>:$owners);
+  let assemblyFormat = "$stage $division (`owners` $owners^)? attr-dict";
   let hasVerifier = 1;
 }
 
@@ -247,7 +268,9 @@ def Piko_ExchangeOp : Piko_ProgramStatement<"exchange", [
   let description = [{
     All ranks run it alike: counts first, then records, each with the bins that
     the receiver owns of it. By the keys that the join names, what comes from
-    several ranks is merged into the order of lineage.
+    several ranks is merged into the order of lineage; without keys what comes
+    from one rank follows what comes from the one before. Of a source each rank
+    has found the bins of a part, and bins alone are exchanged.
 
     ```mlir
     %here = piko.exchange %fragments : !piko.edge<@Fragment>
@@ -262,14 +285,32 @@ def Piko_KeepOp : Piko_ProgramStatement<"keep"> {
   let summary = "remembers what a piece of state holds now";
   let description = [{
     All ranks hold the same then. A `piko.share` finds by it what each has
-    changed.
+    changed. State that is `cleared` is as it was at the start of the run, so that
+    there is nothing to copy.
 
     ```mlir
     piko.keep @histogram
+    piko.keep @visible cleared
     ```
   }];
-  let arguments = (ins FlatSymbolRefAttr:$state);
-  let assemblyFormat = "$state attr-dict";
+  let arguments = (ins FlatSymbolRefAttr:$state, UnitAttr:$cleared);
+  let assemblyFormat = "$state (`cleared` $cleared^)? attr-dict";
+  let hasVerifier = 1;
+}
+
+def Piko_CommonOp : Piko_ProgramStatement<"common"> {
+  let summary = "ranks of one machine may hold an image once";
+  let description = [{
+    No rank uses pixels but those of the bins that it owns `of` a stage, from the
+    start of the run to its end. Then ranks that share memory need not bring them
+    to the first one.
+
+    ```mlir
+    piko.common @depth of @rasterize
+    ```
+  }];
+  let arguments = (ins FlatSymbolRefAttr:$image, FlatSymbolRefAttr:$stage);
+  let assemblyFormat = "$image `of` $stage attr-dict";
   let hasVerifier = 1;
 }
 
@@ -279,23 +320,26 @@ def Piko_ShareOp : Piko_ProgramStatement<"share"> {
     After it all ranks hold the same, or, with `to_first`, the first rank holds
     all. What each brings is the pixels of the bins that it owns `of` a stage;
     or, with `from_first`, all that the first rank holds; or else the elements
-    that it has changed since the `piko.keep` of this state. Fields that several
-    ranks change `reduce`, each by one operation: the changes are combined in the
-    order of ranks.
+    that it has changed since the `piko.keep` of this state, and with `to_owners`
+    only to the rank that owns the bin `of` the stage, which then has its pixels.
+    Fields that several ranks change `reduce`, each by one operation: the changes
+    are combined in the order of ranks.
 
     ```mlir
     piko.share @depth of @rasterize to_first
     piko.share @sums from_first
     piko.share @histogram reduce ["value", "add"]
+    piko.share @visible of @shade to_owners reduce ["key", "max_unsigned"]
     ```
   }];
   let arguments = (ins FlatSymbolRefAttr:$state,
                        OptionalAttr<FlatSymbolRefAttr>:$stage,
                        UnitAttr:$from_first, UnitAttr:$to_first,
+                       UnitAttr:$to_owners,
                        OptionalAttr<StrArrayAttr>:$reduce);
   let assemblyFormat = [{
     $state (`of` $stage^)? (`from_first` $from_first^)? (`to_first` $to_first^)?
-    (`reduce` $reduce^)? attr-dict
+    (`to_owners` $to_owners^)? (`reduce` $reduce^)? attr-dict
   }];
   let hasVerifier = 1;
 }
