@@ -38,6 +38,24 @@ def check_error(args, ranks):
         sys.exit(f"expected one error that names a rank, but got: {done.stderr}")
 
 
+def check_settings(args):
+    """Owners by load, and memory of their own, give the same; others are errors."""
+    file = Path(args.examples) / "raster/raster.piko.cpp"
+    options = [str(file), "--pipe", "Fused", args.scene]
+    expected = render(args, [], options)
+    command = [*MPIRUN, "-np", "2"]
+    settings = [["-x", "PIKO_RANK_OWNERS=load"], ["-x", "PIKO_RANK_MEMORY=apart"]]
+    for setting in settings:
+        got = render(args, [*command, *setting], ["--mpi", *options])
+        if got != expected:
+            sys.exit(f"{setting[1]}: expected {expected}, but got {got}")
+    done = subprocess.run([*command, "-x", "PIKO_RANK_MEMORY=none", args.render, "--mpi",
+                           *options], capture_output=True, text=True, timeout=200)
+    wrong = "PIKO_RANK_MEMORY: expected common or apart, but got 'none'"
+    if done.returncode == 0 or wrong not in done.stderr:
+        sys.exit(f"expected an error about PIKO_RANK_MEMORY, but got: {done.stderr}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--render", required=True)
@@ -55,6 +73,7 @@ def main():
             if got != expected:
                 sys.exit(f"{pipe} on {ranks} ranks: expected {expected}, but got {got}")
             print(f"{pipe} on {ranks} ranks: {got}")
+    check_settings(args)
     check_error(args, 3)
 
 
