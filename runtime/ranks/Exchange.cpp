@@ -185,6 +185,8 @@ static Stream unpack(pikort_pipeline &p, Message message, uint8_t *data,
 
 /// What this rank keeps, which stays where it lies.
 static Stream keepShare(pikort_pipeline &p, Stream stream, Share &share) {
+  if (share.count == 0)
+    return {};
   if (!share.items)
     return stream;
   Keys keys;
