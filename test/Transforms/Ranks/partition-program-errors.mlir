@@ -80,9 +80,9 @@ piko.pipeline @Whole rank 1 {
 // -----
 
 // Loops that are not several ones.
-piko.record @F {"x" : i32 at 0} size 4 align 4
+piko.record @L {"x" : i32 at 0} size 4 align 4
 piko.pipeline @Loops rank 1 {
-  piko.buffer @sums : @F
+  piko.buffer @sums : @L
   piko.source @reads
   piko.source @moves
   piko.source @waits
@@ -91,10 +91,10 @@ piko.pipeline @Loops rank 1 {
   piko.edge @moves[0] -> @moves
   piko.edge @waits[0] -> @waits
   // expected-remark @below {{stage 'reads' runs on the first rank alone: it is on a cycle that reads what it writes}}
-  piko.stage @reads bins [0] threads 1 : @F -> [@F] {
+  piko.stage @reads bins [0] threads 1 : @L -> [@L] {
     piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+    ^bb0(%f: !piko.prim<@L>):
+      %x = piko.get %f "x" : !piko.prim<@L> -> i32
       %old = piko.load @sums[%x : i32] "x" : i32
       piko.store %x, @sums[%old : i32] "x" : i32
       piko.emit 0 (%x) : i32
@@ -102,34 +102,34 @@ piko.pipeline @Loops rank 1 {
     }
   }
   // expected-remark @below {{stage 'moves' runs on the first rank alone: it is on a cycle in which primitives come to other bins}}
-  piko.stage @moves bins [8] threads 1 : @F -> [@F] {
+  piko.stage @moves bins [8] threads 1 : @L -> [@L] {
     piko.assign {
-    ^bb0(%f: !piko.prim<@F>):
-      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+    ^bb0(%f: !piko.prim<@L>):
+      %x = piko.get %f "x" : !piko.prim<@L> -> i32
       %b = piko.bin_at %x : i32
       piko.assign_to %b
       piko.return
     }
     piko.process {
-    ^bb0(%f: !piko.prim<@F>):
-      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+    ^bb0(%f: !piko.prim<@L>):
+      %x = piko.get %f "x" : !piko.prim<@L> -> i32
       piko.emit 0 (%x) : i32
       piko.return
     }
   }
   // expected-remark @below {{is merged by keys of 2 words}}
   // expected-remark @below {{stage 'waits' runs on the first rank alone: it is on a cycle with stages that wait}}
-  piko.stage @waits bins [8] threads 1 : list @F -> [@F] {
+  piko.stage @waits bins [8] threads 1 : list @L -> [@L] {
     piko.assign {
-    ^bb0(%f: !piko.prim<@F>):
+    ^bb0(%f: !piko.prim<@L>):
       piko.assign_all
       piko.return
     }
     piko.process {
-    ^bb0(%list: !piko.list<@F>):
+    ^bb0(%list: !piko.list<@L>):
       %zero = arith.constant 0 : index
-      %f = piko.list_at %list[%zero] : !piko.list<@F> -> !piko.prim<@F>
-      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %f = piko.list_at %list[%zero] : !piko.list<@L> -> !piko.prim<@L>
+      %x = piko.get %f "x" : !piko.prim<@L> -> i32
       piko.emit 0 (%x) : i32
       piko.return
     }
