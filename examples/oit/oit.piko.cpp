@@ -171,6 +171,8 @@ template <Mapping M> struct Oit : piko::Pipe<State> {
     connect(rasterizer, 0, fragmentShader);
     connect(fragmentShader, 0, blend);
     allocateForSource(state().vertices, 0);
+    expectIndex<&Vertex::index>(0, state().vertices);
+    expectIndex<&Triangle::vertex>(1, state().vertices);
   }
 };
 

@@ -324,6 +324,10 @@ struct IndexedRaster : Pixels<M, IndexedState, Shader> {
     this->connect(setup, 0, rasterizer);
     this->connectPixels(rasterizer);
     this->allocateForSource(this->state().vertices, 0);
+    // What scenes have been read to have is tested once, not in each stage.
+    this->template expectIndex<&Vertex::index>(0, this->state().vertices);
+    this->template expectIndex<&Triangle::vertex>(1, this->state().vertices);
+    this->template expectIndex<&Triangle::vertex>(1, this->state().mesh);
   }
 };
 

@@ -260,6 +260,9 @@ template <Mapping Map, Mapping M> struct Shadow : piko::Pipe<State> {
     connect(fragmentShader, 0, depthTest);
     allocateForSource(state().reach, 0);
     allocateForSource(state().vertices, 1);
+    expectIndex<&Vertex::index>(1, state().vertices);
+    expectIndex<&Triangle::vertex>(2, state().vertices);
+    expectIndex<&Triangle::vertex>(3, state().vertices);
   }
 };
 

@@ -337,6 +337,10 @@ struct Pipeline : piko::Pipe<State> {
     this->connect(setup, 2, clipper);
     this->connect(clipper, 0, coverage);
     this->allocateForSource(this->state().vertices, 0);
+    this->expectIndex<&Vertex::index>(0, this->state().vertices);
+    this->expectIndex<&Triangle::vertex>(1, this->state().vertices);
+    this->expectIndex<&Triangle::vertex>(this->state().triangles,
+                                         this->state().mesh);
   }
 };
 

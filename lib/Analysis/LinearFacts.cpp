@@ -247,8 +247,11 @@ Linear LinearFacts::expandArgument(BlockArgument argument, unsigned frame,
     return i;
   }
   auto loop = dyn_cast<scf::WhileOp>(parent);
-  if (!loop)
-    return atom(id);
+  if (!loop) {
+    Linear value = atom(id);
+    bin.assumeContract(argument, frame, value, /*isWidened=*/false);
+    return value;
+  }
   unsigned i = argument.getArgNumber();
   if (argument.getOwner() == loop.getAfterBody())
     return get(loop.getConditionOp().getArgs()[i], frame);
@@ -258,6 +261,7 @@ Linear LinearFacts::expandArgument(BlockArgument argument, unsigned frame,
 Linear LinearFacts::expandCarried(BlockArgument argument, Value init,
                                   unsigned frame, Id id) {
   Linear value = atom(id), first = get(init, frame);
+  bin.assumeContract(argument, frame, value, /*isWidened=*/false);
   const Recurrence recurrence = getRecurrence(argument);
   if (recurrence.ceiling)
     facts->addAtLeastZero(get(recurrence.ceiling, frame) - value);
@@ -355,6 +359,8 @@ Linear LinearFacts::expandOperation(Operation *op, unsigned frame, Id id) {
             type && type.getWidth() < 63)
           facts->addBetween(Linear(0), result,
                             Linear(1) * power(type.getWidth()) - Linear(1));
+        bin.assumeContract(narrow, frame, result,
+                           /*isWidened=*/true);
         return result;
       })
       .Case<arith::FPToSIOp, arith::FPToUIOp>(
@@ -372,6 +378,11 @@ Linear LinearFacts::expandOperation(Operation *op, unsigned frame, Id id) {
       })
       .Case([&](ListSizeOp size) { return bin.getListSize(size.getList()); })
       .Case([&](GetOp get) { return expandField(get, frame, id); })
+      .Case([&](LoadOp load) {
+        Linear value = atom(id);
+        bin.assumeContract(load, frame, value, /*isWidened=*/false);
+        return value;
+      })
       .Case([&](scf::IfOp choice) {
         return expandBranch(
             choice, cast<OpResult>(valueOf(id)).getResultNumber(), frame, id);
@@ -569,6 +580,7 @@ void LinearFacts::expandAhead(scf::IfOp branch, Value value, unsigned frame) {
 
 Linear LinearFacts::expandField(GetOp get, unsigned frame, Id id) {
   Linear value = atom(id);
+  bin.assumeContract(get, frame, value, /*isWidened=*/false);
   if (get.getElements().empty() && bin.isItem(get.getPrim(), frame))
     for (int64_t dim = 0, e = stage.getBins().size(); dim < e; ++dim)
       if (provider.isFieldInBin(stage, get.getField(), dim)) {

@@ -89,15 +89,42 @@ static uint8_t *pointerTo(uint64_t address) {
   return reinterpret_cast<uint8_t *>(address);
 }
 
+/// A buffer that the host may give elements.
+static State &findBindable(pikort_pipeline &p, const char *name) {
+  State &state = findState(p, name, PIKORT_BUFFER);
+  if (state.perSource >= 0)
+    invalid("buffer " + quoted(state.name) + " is allocated for source " +
+            std::to_string(state.perSource) + " and cannot be bound");
+  return state;
+}
+
+/// Gives a buffer memory of our own, with zeros.
+static void allocateBuffer(pikort_pipeline &p, State &state, int64_t count) {
+  int64_t bytes;
+  if (__builtin_mul_overflow(state.roomFor(count), p.records[state.record].size,
+                             &bytes))
+    throw OutOfMemory{INT64_MAX};
+  awaitRun(p);
+  checkAlive(p);
+  state.onDevice = state.bound = false;
+  state.mirror = {};
+  state.own({}); // before the new one, so that both need not fit
+  state.own(Array<uint8_t>(p.memory, bytes, Use::State));
+  std::memset(state.owned.data(), 0, static_cast<size_t>(bytes));
+  state.view = {state.owned.data(), {count, 1, 1, 1}};
+  state.bound = true;
+  ++state.version;
+}
+
 static void bindBuffer(pikort_pipeline *p, const char *name,
                        const Bound &bound) {
-  State &state = findState(*p, name, PIKORT_BUFFER);
+  State &state = findBindable(*p, name);
   std::string who = "buffer " + quoted(state.name);
-  if (state.perSource >= 0)
-    invalid(who + " is allocated for source " +
-            std::to_string(state.perSource) + " and cannot be bound");
   checkArray(*p, who, state.record, bound);
+  if (state.roomFor(bound.count) > bound.count)
+    return allocateBuffer(*p, state, bound.count);
   change(p, [&state, bound] {
+    ++state.version;
     state.own({});
     if (bound.onDevice)
       state.mirror = {}, state.twin = {};
@@ -121,6 +148,7 @@ static void bindSource(pikort_pipeline *p, int32_t index, const Bound &bound) {
                   who + ": expected at most 4294967295 primitives, but got " +
                       std::to_string(bound.count)};
   change(p, [&source, bound] {
+    ++source.version;
     if (bound.onDevice)
       source.mirror = {}, source.twin = {};
     source.data = static_cast<const uint8_t *>(bound.data);
@@ -239,26 +267,12 @@ int32_t pikort_bind_device_buffer(pikort_pipeline *p, const char *name,
 int32_t pikort_allocate_buffer(pikort_pipeline *p, const char *name,
                                int64_t count) {
   return call(p, [&] {
-    State &state = findState(*p, name, PIKORT_BUFFER);
-    std::string who = "buffer " + quoted(state.name);
-    if (state.perSource >= 0)
-      invalid(who + " is allocated for source " +
-              std::to_string(state.perSource) + " and cannot be bound");
+    State &state = findBindable(*p, name);
     if (count < 0)
-      invalid(who + ": expected a count of at least 0, but got " +
+      invalid("buffer " + quoted(state.name) +
+              ": expected a count of at least 0, but got " +
               std::to_string(count));
-    int64_t bytes;
-    if (__builtin_mul_overflow(count, p->records[state.record].size, &bytes))
-      throw OutOfMemory{INT64_MAX};
-    awaitRun(*p);
-    checkAlive(*p);
-    state.onDevice = state.bound = false;
-    state.mirror = {};
-    state.own({}); // before the new one, so that both need not fit
-    state.own(Array<uint8_t>(p->memory, bytes, Use::State));
-    std::memset(state.owned.data(), 0, static_cast<size_t>(bytes));
-    state.view = {state.owned.data(), {count, 1, 1, 1}};
-    state.bound = true;
+    allocateBuffer(*p, state, count);
   });
 }
 
@@ -296,6 +310,7 @@ int32_t pikort_get_view(pikort_pipeline *p, const char *name,
     if (state.owned) {
       bringToHost(*p, state);
       state.twinIsCurrent = false; // the host may write there
+      ++state.version;
     }
     *view = viewOf(*p, state);
   });
@@ -323,6 +338,7 @@ int32_t pikort_get_device_view(pikort_pipeline *p, const char *name,
         p->accelerator->finishStream();
       }
       state.hostIsCurrent = false; // whoever has the view may write there
+      ++state.version;
       there.data = state.twin.data();
     }
     describe(there, p->records[state.record], *view);

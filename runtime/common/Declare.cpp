@@ -159,6 +159,32 @@ void pikoir_declare_fixed(pikort_pipeline *p, int32_t id, const char *field,
   });
 }
 
+void pikoir_declare_contract(pikort_pipeline *p, int32_t source, int32_t state,
+                             const char *field, int32_t type,
+                             int32_t isUnsigned, int64_t offset,
+                             int64_t elements, int64_t stride, int32_t target,
+                             int64_t below) {
+  guarded(p, "setup", [&] {
+    std::string name = orEmpty(field), who = "field " + quoted(name);
+    expect(source < 0 || source < static_cast<int32_t>(p->sources.size()),
+           who + ": expected a declared source, but got " +
+               std::to_string(source));
+    if (source < 0)
+      (void)findBuffer(p, state);
+    expect(type >= PIKORT_I8 && type <= PIKORT_I64 && offset >= 0 &&
+               elements > 0 && stride >= 0,
+           who + ": expected integers");
+    expect(target >= 0 || below > 0,
+           who + ": expected to be below at least 1, but got " +
+               std::to_string(below));
+    if (target >= 0)
+      findBuffer(p, target).indexed = true;
+    p->contracts.add({source < 0 ? -1 : source, source < 0 ? state : -1,
+                      target < 0 ? -1 : target, below, type, isUnsigned != 0},
+                     {std::move(name), offset, elements, stride});
+  });
+}
+
 void pikoir_declare_internal(pikort_pipeline *p, int32_t id) {
   guarded(p, "setup",
           [&] { findState(p, id, PIKORT_IMAGE, "an image").internal = true; });

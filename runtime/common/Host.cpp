@@ -182,7 +182,13 @@ int32_t pikort_set_strip_size(pikort_pipeline *p, int64_t primitives) {
 }
 
 int32_t pikort_set_static_input(pikort_pipeline *p, int32_t on) {
-  return call(p, [&] { change(p, [=] { p->hasStaticInput = on != 0; }); });
+  return call(p, [&] {
+    change(p, [=] {
+      if (p->hasStaticInput != (on != 0))
+        p->contracts.forget();
+      p->hasStaticInput = on != 0;
+    });
+  });
 }
 
 int32_t pikort_set_kernel_times(pikort_pipeline *p, int32_t on) {

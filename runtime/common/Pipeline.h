@@ -11,6 +11,7 @@
 #define PIKO_RUNTIME_COMMON_PIPELINE_H
 
 #include "common/Accelerator.h"
+#include "common/Contracts.h"
 #include "common/Counters.h"
 #include "common/Executor.h"
 #include "common/Profile.h"
@@ -59,6 +60,7 @@ struct State {
   bool bound = false;
   bool written = false;  ///< A buffer that kernels change.
   bool unused = false;   ///< A buffer that no kernel uses.
+  bool indexed = false;  ///< A buffer that contracts are about.
   bool internal = false; ///< An image that the host does not see.
   /// The stage in whose bins ranks use pixels that they own, and no others.
   int32_t commonStage = -1;
@@ -74,6 +76,13 @@ struct State {
   bool hostIsCurrent = true;  ///< ... which `owned` does, too.
   uint8_t *hosts = nullptr;   ///< The host's memory, while another is used.
   pikoir_state view{};
+  int64_t version = 0; ///< How often the host may have changed a buffer.
+
+  /// For how many elements there is memory: kernels may read the first one
+  /// where an index is wrong (piko.contract).
+  int64_t roomFor(int64_t count) const {
+    return count == 0 && indexed ? 1 : count;
+  }
 
   /// Memory of our own, or none, of which a device has nothing yet.
   void own(Array<uint8_t> memory) {
@@ -155,6 +164,7 @@ struct Source {
   int32_t stage = 0;
   const uint8_t *data = nullptr;
   int64_t count = 0;     ///< 0 until the host binds some
+  int64_t version = 0;   ///< How often it has
   bool onDevice = false; ///< What is bound is a device's memory.
   Array<uint8_t> mirror; ///< What a device sees of the host's own memory, ...
   DeviceBytes twin;      ///< ... and what frames of it see, ...
@@ -340,6 +350,7 @@ struct pikort_pipeline {
 
   std::vector<piko::rt::Mapping> mappings; ///< By kernel and number.
   std::vector<piko::rt::Fixed> fixed;
+  piko::rt::Contracts contracts;
   std::vector<std::unique_ptr<piko::rt::Counter>> counters;
   piko::rt::Profile profile{memory};
   std::vector<piko::rt::KernelStats> kernelStats;

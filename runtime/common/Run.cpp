@@ -189,6 +189,9 @@ static void begin(pikort_pipeline &p, void *stream, bool waits) {
     invalid("pipeline " + quoted(p.name) +
             ": expected a run without a stream, because the pipeline is on the "
             "processor");
+  // What has waited for the stream has left it.
+  if (p.contracts.check(p) && p.accelerator)
+    p.accelerator->useStream(stream, waits);
   p.executor->beginRun();
   if (p.status != PIKORT_OK)
     return;

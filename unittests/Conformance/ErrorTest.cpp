@@ -82,6 +82,64 @@ TEST_F(Error, IndexOutsideIsThatOfTheFirstPrimitive) {
   EXPECT_RUNS(pipe);
 }
 
+TEST_F(Error, NumbersThatAreNoIndices) {
+  Pipeline pipe = make(conformance_Fetches_program);
+  Items items = makeItems(20, 4);
+  for (size_t i = 0; i < items.size(); ++i)
+    items[i].kind = int32_t(i % 5);
+  std::vector<int32_t> indices{3, 19, 0, 7, 7}, sums(5),
+      table{1, 2, 3, 19, 5, 6, 7, 0, 9, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 4};
+  auto expectSums = [&] {
+    std::vector<int32_t> expected(5);
+    for (int32_t i : indices) {
+      expected[i % 5] += table[i % 5] + i;
+      expected[table[i] % 5] += 1;
+    }
+    sums.assign(5, 0);
+    EXPECT_RUNS(pipe);
+    EXPECT_EQ(sums, expected);
+  };
+  ASSERT_TRUE(pipe.source(0, indices));
+  ASSERT_TRUE(pipe.buffer("items", items));
+  ASSERT_TRUE(pipe.buffer("table", table));
+  ASSERT_TRUE(pipe.buffer("sums", sums));
+  expectSums();
+  std::vector<int32_t> wrong = indices;
+  wrong[3] = 20;
+  wrong[4] = -1;
+  ASSERT_TRUE(pipe.source(0, wrong));
+  for (int run = 0; run < 2; ++run)
+    expectError(pipe.run(), PIKORT_INDEX_OUTSIDE,
+                {"stage 'fetch': expected primitive 3 of source 0 to be an "
+                 "index into 'items', in [0, 20), but got 20"});
+  ASSERT_TRUE(pipe.source(0, indices));
+  expectSums();
+  items[19].kind = 5;
+  ASSERT_TRUE(pipe.buffer("items", items));
+  expectError(pipe.run(), PIKORT_INDEX_OUTSIDE,
+              {"buffer 'items': expected field 'kind' of element 19 to be an "
+               "index into 'sums', in [0, 5), but got 5"});
+  items[19].kind = 4;
+  ASSERT_TRUE(pipe.buffer("items", items));
+  table[2] = 77;
+  ASSERT_TRUE(pipe.buffer("table", table));
+  expectError(pipe.run(), PIKORT_INDEX_OUTSIDE,
+              {"buffer 'table': expected element 2 to be an index into "
+               "'items', in [0, 20), but got 77"});
+  table[2] = 0;
+  ASSERT_TRUE(pipe.buffer("table", table));
+  expectSums();
+  // An index that has no contract is tested in the kernel. What it reads then
+  // may be read at, even where there is nothing.
+  std::vector<int32_t> few{1, 1, 1, 1, 1};
+  ASSERT_TRUE(pipe.buffer("table", few));
+  expectError(pipe.run(), PIKORT_INDEX_OUTSIDE,
+              {"'again'", "expected an index into 'table' in [0, 5), but got "
+                          "19"});
+  ASSERT_TRUE(pipe.buffer("table", table));
+  expectSums();
+}
+
 TEST_F(Error, LoopsThatDoNotEnd) {
   for (const auto *program :
        {&conformance_Waves_program, &conformance_Stacks_program,

@@ -340,3 +340,47 @@ struct Frames : piko::Pipe<FrameState> {
     allocateForSource(state().kept, 0);
   }
 };
+
+//===----------------------------------------------------------------------===//
+// Fetches: indices that the host's numbers are expected to be
+//===----------------------------------------------------------------------===//
+
+struct FetchState {
+  piko::Buffer<Item> items;
+  piko::Buffer<int32_t> table;
+  piko::Buffer<int32_t> sums; // by kind
+};
+
+struct Fetch : piko::Stage<0, 0, 64, int32_t, int32_t>, piko::Uses<FetchState> {
+  void process(const int32_t &i) {
+    const Item &item = state().items[i];
+    piko::atomicAdd(state().sums[item.kind], state().table[item.kind] + i);
+    emit(i);
+  }
+};
+
+/// Where an index of another table is wrong, a read of it gives one.
+struct FetchAgain : piko::Stage<binExtent, binExtent, 64, int32_t>,
+                    piko::Uses<FetchState> {
+  void assignBin(const int32_t &i) {
+    const Item &item = state().items[i];
+    assignToBin(i, binFromPosition(glm::ivec2(item.kind, item.kind)));
+  }
+  void process(const int32_t &i) {
+    const Item &item = state().items[state().table[i]];
+    piko::atomicAdd(state().sums[item.kind], 1);
+  }
+};
+
+struct Fetches : piko::Pipe<FetchState> {
+  Fetch fetch;
+  FetchAgain again;
+  Fetches() {
+    source(fetch);
+    connect(fetch, 0, again);
+    expectIndex<int32_t>(0, state().items);
+    expectIndex<&Item::kind>(state().items, state().table);
+    expectIndex<&Item::kind>(state().items, state().sums);
+    expectIndex(state().table, state().items);
+  }
+};

@@ -22,6 +22,8 @@
 
 namespace piko {
 
+class ContractOp;
+
 /// The most cells that a domain may have in a dimension: PIKORT_MAX_EXTENT.
 inline constexpr int64_t maxDomainExtent = int64_t(1) << 30;
 
@@ -57,6 +59,13 @@ public:
 
   Linear getDomain(int64_t dim);
   Linear getExtent(llvm::StringRef state, int64_t dim);
+  /// How many elements may be read: one, too, of a buffer that contracts are
+  /// about and that has none.
+  Linear getRoom(llvm::StringRef state, int64_t dim);
+  /// Adds what contracts say of a number that is read, or comes from some, or
+  /// of what it is when widened without a sign.
+  void assumeContract(mlir::Value value, unsigned frame, const Linear &number,
+                      bool isWidened);
   Linear getListSize(mlir::Value list);
   std::pair<Linear, Linear> getBin(int64_t dim);
   bool isAboveBin(mlir::Value coordinate, int64_t dim, unsigned frame);
@@ -71,6 +80,10 @@ public:
   LinearFact describeInBin(BinAtOp cell, unsigned frame);
 
 private:
+  /// Whether a value is a primitive that has reached the stage.
+  bool isFed(mlir::Value prim, unsigned frame);
+  void assumeBelow(ContractOp contract, mlir::Type type, const Linear &number,
+                   bool isWidened);
   /// Whether a list is read at an index that it has.
   bool isInside(ListAtOp read);
   /// Whether no call gets an empty list.
@@ -83,6 +96,7 @@ private:
   std::map<int64_t, Linear> domains;
   std::map<int64_t, std::pair<Linear, Linear>> bins;
   std::map<std::pair<std::string, int64_t>, Linear> extents;
+  std::map<std::string, Linear> rooms; ///< Of buffers that contracts index.
 };
 
 /// Of LinearFacts: floats that are whole numbers, or whose floor is known.
@@ -180,8 +194,8 @@ public:
               unsigned frameOfB) {
     return number(a, frameOfA) == number(b, frameOfB);
   }
-  Linear getExtent(llvm::StringRef state, int64_t dim) {
-    return bin.getExtent(state, dim);
+  Linear getRoom(llvm::StringRef state, int64_t dim) {
+    return bin.getRoom(state, dim);
   }
   Linear getListSize(mlir::Value list) { return bin.getListSize(list); }
   bool isAtLeastZero(const Linear &value) {

@@ -155,6 +155,19 @@ struct SourceDescription {
   mlir::Location location;
 };
 
+/// What a constructor expects of the host's numbers; see `piko.contract`.
+struct ContractDescription {
+  /// Of a source's primitives, or of the elements of a buffer.
+  std::optional<int64_t> source;
+  std::optional<unsigned> buffer;
+  std::vector<std::string> fields;
+  bool isSigned;
+  /// The buffer that they index, or what they are below.
+  std::optional<unsigned> target;
+  int64_t below;
+  mlir::Location location;
+};
+
 struct PipelineDescription {
   std::string name = {};
   std::string typeName = {};
@@ -165,6 +178,7 @@ struct PipelineDescription {
   std::vector<StageDescription> stages = {};
   std::vector<SourceDescription> sources = {};
   std::vector<EdgeDescription> edges = {};
+  std::vector<ContractDescription> contracts = {};
 };
 
 } // namespace piko

@@ -346,7 +346,10 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
     **Does**: marks accesses to buffers, images and lists as `checked` where each
     index is at least 0 and less than the extent. Marks updates, and loads and stores
     of images, with `piko.inside` where their coordinates lie between the bounds of
-    the bin. Both are proved as in `piko-infer-directives`.
+    the bin. Both are proved as in `piko-infer-directives`. What a `piko.contract`
+    says of the host's numbers is known of them, also where stages emit them
+    unchanged; not in checking mode. A read that fails gives 0: a buffer that
+    contracts are about can be read there, even if it is empty.
 
     **Guarantees** that no access that is marked is outside.
 
@@ -361,10 +364,11 @@ def ProveBounds : Pass<"piko-prove-bounds", "::piko::PipelineOp"> {
       %x = piko.load checked @lights[%i : index] "x" : f32
     ```
 
-    **Limits**: what follows from the contents of buffers, or from constants that the
-    host sets, is not known. Nor is it known of a buffer, as it is of the domain, that
+    **Limits**: what follows otherwise from the contents of buffers, or from constants
+    that the host sets, is not known. Nor is it known of a buffer, as it is of the domain, that
     it has an element at all. An index that is clamped to it, or a remainder, is
-    therefore tested. A remark names each access that is.
+    therefore tested. A remark names each access that is, and with contracts one counts
+    them.
   }];
 }
 

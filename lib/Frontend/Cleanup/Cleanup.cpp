@@ -379,7 +379,8 @@ static void dropWiring(llvm::Function &constructor, const MarkerTable &markers,
       if (const Marker *marker = getMarker(call, markers);
           marker && (marker->kind == MarkerKind::source ||
                      marker->kind == MarkerKind::connect ||
-                     marker->kind == MarkerKind::allocateForSource))
+                     marker->kind == MarkerKind::allocateForSource ||
+                     marker->kind == MarkerKind::expectIndex))
         call->eraseFromParent();
   dropHints(constructor);
   llvm::FunctionPassManager simplify;

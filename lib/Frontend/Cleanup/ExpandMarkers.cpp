@@ -70,6 +70,7 @@ private:
     case MarkerKind::source:
     case MarkerKind::connect:
     case MarkerKind::allocateForSource:
+    case MarkerKind::expectIndex:
       // The pipeline's constructor, run again inside a phase.
       if (isWiring)
         return;

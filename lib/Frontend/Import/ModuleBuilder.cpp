@@ -7,7 +7,7 @@
 
 #include "Import/Import.h"
 #include "Piko/Dialect/Piko/IR/CppTypes.h"
-#include "Piko/Dialect/Piko/IR/Piko.h"
+#include "Piko/Dialect/Piko/IR/PikoFixed.h"
 
 using namespace piko;
 using llvm::failed;
@@ -40,15 +40,51 @@ public:
                      pipeline.stages[edge.producer].symbol, edge.port,
                      pipeline.stages[edge.consumer].symbol,
                      /*carried=*/mlir::IntegerAttr());
+    for (const ContractDescription &contract : pipeline.contracts)
+      buildContract(contract);
     for (unsigned stage = 0; stage < pipeline.stages.size(); ++stage) {
       mlir::OpBuilder::InsertionGuard guard(builder);
       if (!buildStage(stage))
         return nullptr;
     }
+    if (!keepContracts(op))
+      return nullptr;
     return module;
   }
 
 private:
+  void buildContract(const ContractDescription &contract) {
+    auto name = [&](std::optional<unsigned> state) {
+      return state ? mlir::FlatSymbolRefAttr::get(&context,
+                                                  pipeline.state[*state].name)
+                   : mlir::FlatSymbolRefAttr();
+    };
+    auto number = [&](bool has, int64_t value) {
+      return has ? builder.getI64IntegerAttr(value) : mlir::IntegerAttr();
+    };
+    for (llvm::StringRef field : contract.fields)
+      ContractOp::create(
+          builder, contract.location, name(contract.buffer),
+          number(!contract.buffer, contract.source.value_or(0)),
+          builder.getStringAttr(field),
+          contract.isSigned ? mlir::UnitAttr() : builder.getUnitAttr(),
+          name(contract.target), number(!contract.target, contract.below));
+  }
+
+  /// Refuses to write what is tested only where the host binds it.
+  static bool keepContracts(PipelineOp pipeline) {
+    for (auto contract : pipeline.getOps<ContractOp>())
+      if (mlir::Operation *write = contract.findWrite()) {
+        mlir::InFlightDiagnostic error = mlir::emitError(write->getLoc());
+        error << "expected no stage to write '" << *contract.getBuffer()
+              << "', whose indices are tested where the host binds them";
+        error.attachNote(contract.getLoc())
+            << "expectIndex is here: leave it out, or write to another buffer";
+        return false;
+      }
+    return true;
+  }
+
   /// Where phases take positions that are floats, the domain is limited.
   mlir::IntegerAttr getMaxExtent() {
     constexpr int64_t most = int64_t(1) << 23; // of piko/bins.h

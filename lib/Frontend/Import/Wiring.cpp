@@ -106,6 +106,9 @@ private:
       case MarkerKind::allocateForSource:
         ok = readAllocation(call);
         break;
+      case MarkerKind::expectIndex:
+        ok = readContract(call, *marker);
+        break;
       default:
         fail(call) << "expected a pipeline's constructor to connect its stages "
                       "and nothing else";
@@ -172,20 +175,98 @@ private:
     return true;
   }
 
+  /// A buffer of the state, by its number; reports where it is none.
+  std::optional<unsigned> getBuffer(const llvm::CallInst *call,
+                                    unsigned operand) {
+    const StateDescription *state =
+        memory.getState(call->getArgOperand(operand));
+    if (state)
+      return state - pipeline.state.data();
+    fail(call) << "expected a buffer of the pipeline's state";
+    return std::nullopt;
+  }
+
   bool readAllocation(const llvm::CallInst *call) {
-    const StateDescription *state = memory.getState(call->getArgOperand(0));
     std::optional<int64_t> source =
         getConstant(call, 1, "the source of a buffer");
-    if (!source)
+    std::optional<unsigned> buffer = source ? getBuffer(call, 0) : std::nullopt;
+    if (!buffer)
       return false;
-    if (!state) {
-      fail(call) << "expected a buffer of the pipeline's state";
-      return false;
-    }
-    StateDescription &ours = pipeline.state[state - pipeline.state.data()];
+    StateDescription &ours = pipeline.state[*buffer];
     ours.perSource = source;
     allocations.push_back({&ours, call});
     return true;
+  }
+
+  bool readContract(const llvm::CallInst *call, const Marker &marker) {
+    std::optional<int64_t> source = getConstant(call, 0,
+                                                "the source of a "
+                                                "field");
+    std::optional<int64_t> offset = getConstant(call, 2, "a field"),
+                           size = getConstant(call, 3, "a field"),
+                           below = getConstant(call, 5,
+                                               "what an index is "
+                                               "below");
+    if (!source || !offset || !size || !below)
+      return false;
+    ContractDescription contract{std::nullopt,
+                                 std::nullopt,
+                                 {},
+                                 marker.isSigned,
+                                 std::nullopt,
+                                 *below,
+                                 getUserLocation(call, unit, context)};
+    if (llvm::isa<llvm::ConstantPointerNull>(call->getArgOperand(1)))
+      contract.source = source;
+    else if (contract.buffer = getBuffer(call, 1); !contract.buffer)
+      return false;
+    if (!llvm::isa<llvm::ConstantPointerNull>(call->getArgOperand(4))) {
+      if (contract.target = getBuffer(call, 4); !contract.target)
+        return false;
+    } else if (*below < 1) {
+      fail(call) << "expected an index to be below a number of at least 1, but "
+                    "got "
+                 << *below;
+      return false;
+    }
+    for (const LeafField &field : pipeline.records[marker.record].fields)
+      if (field.offset >= *offset && field.offset < *offset + *size)
+        contract.fields.push_back(field.name);
+    contracts.push_back({pipeline.contracts.size(), marker.record, call});
+    pipeline.contracts.push_back(std::move(contract));
+    return true;
+  }
+
+  /// Sources are known, and which buffers are allocated for them.
+  bool checkContract(const ContractDescription &contract, unsigned record,
+                     const llvm::CallInst *call) {
+    if (contract.buffer) {
+      const StateDescription &buffer = pipeline.state[*contract.buffer];
+      if (buffer.perSource)
+        fail(call) << "expected indices that the host binds, but '"
+                   << buffer.name << "' is allocated for a source";
+      return !buffer.perSource;
+    }
+    if (!checkSource(*contract.source, call))
+      return false;
+    unsigned taken =
+        pipeline.stages[pipeline.sources[*contract.source].stage].input;
+    if (taken != record)
+      fail(call) << "expected a field of '" << pipeline.records[taken].name
+                 << "', which source " << *contract.source
+                 << " has, but got one of '" << pipeline.records[record].name
+                 << "'";
+    return taken == record;
+  }
+
+  bool checkSource(int64_t source, const llvm::CallInst *call) {
+    int64_t sources = pipeline.sources.size();
+    bool isOne = source >= 0 && source < sources;
+    if (!isOne)
+      fail(call) << "expected one of the " << sources
+                 << " sources of pipeline '" << pipeline.name
+                 << "', but got source " << source;
+    return isOne;
   }
 
   bool checkGraph() {
@@ -194,14 +275,12 @@ private:
           << "expected pipeline '" << pipeline.name << "' to have a source";
       return false;
     }
-    int64_t sources = pipeline.sources.size();
     for (auto [state, call] : allocations)
-      if (*state->perSource < 0 || *state->perSource >= sources) {
-        fail(call) << "expected one of the " << sources
-                   << " sources of pipeline '" << pipeline.name
-                   << "', but got source " << *state->perSource;
+      if (!checkSource(*state->perSource, call))
         return false;
-      }
+    for (auto [number, record, call] : contracts)
+      if (!checkContract(pipeline.contracts[number], record, call))
+        return false;
     bool ok = true;
     for (auto [index, stage] : llvm::enumerate(pipeline.stages))
       for (unsigned port = 0; port < stage.outputs.size(); ++port)
@@ -254,6 +333,8 @@ private:
   mlir::MLIRContext &context;
   std::vector<std::pair<StateDescription *, const llvm::CallInst *>>
       allocations;
+  /// By number, with the record that the field is of.
+  std::vector<std::tuple<size_t, unsigned, const llvm::CallInst *>> contracts;
 };
 
 } // namespace

@@ -298,6 +298,7 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
   case MarkerKind::reduceBegin:
   case MarkerKind::scanBegin:
   case MarkerKind::combineEnd:
+  case MarkerKind::expectIndex:
   case MarkerKind::clear: {
     llvm::FailureOr<unsigned> record = reader.records.get(
         (*arguments)[0].getAsType(), reader.unit->pipeline.location);
@@ -305,6 +306,8 @@ readMarker(const clang::FunctionDecl *function, UnitReader &reader) {
       return llvm::failure();
     marker.record = *record;
     marker.isReadOnly = (*arguments)[0].getAsType().isConstQualified();
+    if (*kind == MarkerKind::expectIndex)
+      marker.isSigned = (*arguments)[1].getAsIntegral().getBoolValue();
     break;
   }
   case MarkerKind::state:

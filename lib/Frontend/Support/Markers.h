@@ -58,7 +58,8 @@ struct Marker {
   unsigned record = 0;
   /// element: whether only atomics may change what it gives.
   bool isReadOnly = false;
-  /// Atomics: which operation. Those and sort: whether on signed numbers.
+  /// Atomics: which operation. Those, sort and expectIndex: whether of signed
+  /// numbers.
   int operation = 0;
   bool isSigned = false;
   /// state: where what it gives begins in the pipeline's state.

@@ -9,6 +9,7 @@
 #include "Piko/Dialect/Piko/IR/Marks.h"
 
 #include "Piko/Dialect/Piko/IR/BinArithmetic.h"
+#include "Piko/Dialect/Piko/IR/PikoFixed.h"
 #include "Piko/Transforms/Passes.h"
 
 #include "llvm/ADT/TypeSwitch.h"
@@ -65,7 +66,7 @@ bool Prover::isInState(Operation *access, StringRef state,
   for (auto [dim, value] : llvm::enumerate(indices)) {
     Linear index = known.get(value);
     if (!known.isAtLeastZero(index) ||
-        !known.isAtLeastZero(known.getExtent(state, dim) - index - Linear(1)))
+        !known.isAtLeastZero(known.getRoom(state, dim) - index - Linear(1)))
       return false;
   }
   return true;
@@ -81,6 +82,7 @@ bool Prover::isInList(ListAtOp at) {
 
 void ProveBoundsPass::runOnOperation() {
   Prover prover;
+  int64_t accesses = 0, tested = 0;
   auto note = [&](Operation *op, bool isInside, const Twine &what) {
     if (!isInside)
       op->emitRemark() << what << " when the pipeline runs";
@@ -106,6 +108,8 @@ void ProveBoundsPass::runOnOperation() {
           note(access,
                prover.isInState(access, access.getState(), access.getIndices()),
                "the index of '" + access.getState() + "' is tested"));
+    accesses += !access.getIndices().empty();
+    tested += !access.getIndices().empty() && !access.getChecked();
   };
   auto visitList = [&](ListAtOp at) {
     if (!at.getChecked())
@@ -125,4 +129,9 @@ void ProveBoundsPass::runOnOperation() {
           .Case(visitList)
           .Case(visitUpdate);
     });
+  if (!getOperation().getOps<ContractOp>().empty())
+    getOperation().emitRemark()
+        << "with what the host's contracts say, the indices of " << tested
+        << " of " << accesses
+        << " accesses to state are tested when the pipeline runs";
 }

@@ -45,7 +45,7 @@ static void allocate(pikort_pipeline &p, State &state) {
   int64_t bytes = p.records[state.record].size;
   bool overflow = false;
   for (int64_t extent : state.view.extent)
-    overflow |= __builtin_mul_overflow(bytes, extent, &bytes);
+    overflow |= __builtin_mul_overflow(bytes, state.roomFor(extent), &bytes);
   if (overflow)
     throw OutOfMemory{INT64_MAX};
   if (uint8_t *common = p.ranks ? p.ranks->commonMemory(state) : nullptr) {

@@ -200,6 +200,21 @@ PIKORT_API void pikoir_declare_fixed(pikort_pipeline *p, int32_t state,
                                      const char *field, int64_t offset,
                                      int64_t size, int64_t bits);
 
+// --- contracts
+// ----------------------------------------------------------------
+
+/// The code takes all integers of a field, of `type`, a pikort_field_type, to
+/// be at least 0 and below the number of elements of the buffer `target`, or,
+/// if that is -1, below a number. The field is of the primitives of a source,
+/// or if `source` is -1 of the elements of a buffer, `state`. Buffers and
+/// sources are declared before. A run with others is an error.
+PIKORT_API void pikoir_declare_contract(pikort_pipeline *p, int32_t source,
+                                        int32_t state, const char *field,
+                                        int32_t type, int32_t is_unsigned,
+                                        int64_t offset, int64_t elements,
+                                        int64_t stride, int32_t target,
+                                        int64_t below);
+
 #ifdef __cplusplus
 } // extern "C"
 #endif

@@ -88,6 +88,45 @@ TEST_F(CudaMemory, DeviceMemoryIsUsedInPlace) {
   EXPECT_EQ(from.get(), numbers);
 }
 
+/// Each number of the source is an index of what is written.
+struct IndexProgram : ScaleProgram {
+  static const pikort_program program;
+};
+const pikort_program IndexProgram::program{
+    PIKORT_ABI_VERSION, "Indices",
+    [](pikort_pipeline *p) {
+      ScaleProgram::program.setup(p);
+      pikoir_declare_contract(p, 0, -1, "value", PIKORT_I32, 0, 0, 1, 0, 1, 0);
+    },
+    ScaleProgram::program.run};
+
+TEST_F(CudaMemory, IndicesThatAreThereAreTestedOnce) {
+  HostContext host;
+  DeviceNumbers from(numbers);
+  Pipeline pipe{IndexProgram::program, Device{0}};
+  ASSERT_TRUE(bind(pipe));
+  ASSERT_TRUE(pipe.source(0, from.span()));
+  for (int run = 0; run < 3; ++run)
+    ASSERT_TRUE(pipe.run());
+  expectScaled(out);
+  // The source once, and what each run writes.
+  expectArrays(hostCounts().bytesFromDevice, 1 + 3);
+  numbers[17] = 5000;
+  DeviceNumbers wrong(numbers);
+  ASSERT_TRUE(pipe.source(0, wrong.span()));
+  out.assign(5000, 0);
+  expectIn(pipe.run(), {"expected primitive 17 of source 0 to be an index into "
+                        "'out', in [0, 5000), but got 5000"});
+  expectIn(pipe.runAsync(), {"primitive 17 of source 0"});
+  EXPECT_EQ(out, std::vector<int32_t>(5000));
+  ASSERT_TRUE(pipe.source(0, from.span()));
+  ASSERT_TRUE(pipe.run());
+  expectScaled(out);
+  // What the pipeline has itself a view may have changed there.
+  ASSERT_TRUE(pipe.allocate("out", 4000));
+  expectIn(pipe.run(), {"in [0, 4000), but got 4000"});
+}
+
 TEST_F(CudaMemory, ManagedMemoryCanBeBoundAsEither) {
   HostContext host;
   CUdeviceptr managed = 0;

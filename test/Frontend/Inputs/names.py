@@ -22,7 +22,7 @@ STAGE = """
     scan sort bin binLo binHi binFromPosition domain state BasicStage Stage
     Uses"""
 PIPE = """
-    source connect allocateForSource state setDomain feed run tryRun
+    source connect allocateForSource expectIndex state setDomain feed run tryRun
     setLoopLimit setThreads setMemoryLimit setMemoryBudget setStripSize
     setMappings expectNumbers nameState Pipe"""
 NAMESPACE = """

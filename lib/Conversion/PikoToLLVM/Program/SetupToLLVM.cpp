@@ -45,9 +45,14 @@ private:
 
   void declareRecord(StringAttr name, int32_t number);
   void declareField(FieldAttr field, int32_t record);
+  /// With the name, offset, length and stride of each part of a field.
+  void
+  forRows(FieldAttr field,
+          llvm::function_ref<void(std::string, Value, Value, Value)> declare);
   void declareCheckedRecord(CheckRecordOp record);
   void declareCounter(CounterOp counter);
   void declareFixed(FixedOp fixed);
+  void declareContract(ContractOp contract);
   void declareState(Operation *state, int32_t number);
   void declareStage(StageOp stage, int32_t number);
   void declareEdge(EdgeOp edge);
@@ -112,7 +117,9 @@ void SetupWriter::declareRecord(StringAttr name, int32_t number) {
 
 /// The runtime's fields are evenly spaced: an array that is not, such as one
 /// inside the elements of another, is declared row by row.
-void SetupWriter::declareField(FieldAttr field, int32_t record) {
+void SetupWriter::forRows(
+    FieldAttr field,
+    llvm::function_ref<void(std::string, Value, Value, Value)> declare) {
   ArrayRef<int64_t> counts = field.getCounts(), strides = field.getStrides();
   bool isEven = true;
   for (size_t d = 1; d < counts.size(); ++d)
@@ -122,11 +129,35 @@ void SetupWriter::declareField(FieldAttr field, int32_t record) {
     std::string name = field.getName().str();
     if (!isEven)
       name += "[" + std::to_string(row) + "]";
-    call(PIKO_RUNTIME_FUNCTION(pikoir_declare_field),
-         {i32(record), text(name), i32(fieldType(field.getType())),
-          i64(field.getElementOffset(row * rowLength)), i64(rowLength),
-          i64(strides.empty() ? 0 : strides.back())});
+    declare(name, i64(field.getElementOffset(row * rowLength)), i64(rowLength),
+            i64(strides.empty() ? 0 : strides.back()));
   }
+}
+
+void SetupWriter::declareField(FieldAttr field, int32_t record) {
+  forRows(field,
+          [&](std::string name, Value offset, Value length, Value stride) {
+            call(PIKO_RUNTIME_FUNCTION(pikoir_declare_field),
+                 {i32(record), text(name), i32(fieldType(field.getType())),
+                  offset, length, stride});
+          });
+}
+
+void SetupWriter::declareContract(ContractOp contract) {
+  auto number = [&](FlatSymbolRefAttr state) {
+    return i32(state ? numbers.states.lookup(state.getAttr()) : -1);
+  };
+  FieldAttr field =
+      context.record(contract.getRecord()).getField(contract.getField());
+  forRows(field,
+          [&](std::string name, Value offset, Value length, Value stride) {
+            call(PIKO_RUNTIME_FUNCTION(pikoir_declare_contract),
+                 {i32(contract.getSource().value_or(-1)),
+                  number(contract.getBufferAttr()), text(name),
+                  i32(fieldType(field.getType())), i32(contract.getHasNoSign()),
+                  offset, length, stride, number(contract.getTargetAttr()),
+                  i64(contract.getBelow().value_or(0))});
+          });
 }
 
 void SetupWriter::declareCounter(CounterOp counter) {
@@ -416,6 +447,8 @@ void SetupWriter::run(ProgramOp program) {
     declareState(SymbolTable::lookupSymbolIn(pipeline, name), number);
   for (auto fixed : pipeline.getOps<FixedOp>())
     declareFixed(fixed);
+  for (auto contract : pipeline.getOps<ContractOp>())
+    declareContract(contract);
   for (auto counter : pipeline.getOps<CounterOp>())
     declareCounter(counter);
   declareReductions(builder, frame, numbers, context);

@@ -218,7 +218,7 @@ static LogicalResult verifyReached(PipelineOp pipeline) {
 LogicalResult PipelineOp::verifyRegions() {
   for (Operation &op : *getBodyBlock())
     if (!isa<ConstantOp, BufferOp, ImageOp, SourceOp, EdgeOp, StageOp, KernelOp,
-             ProgramOp, CheckRecordOp, CounterOp, FixedOp>(op))
+             ProgramOp, CheckRecordOp, CounterOp, FixedOp, ContractOp>(op))
       return op.emitOpError(
           "expected only state, sources, edges, stages, kernels and a program "
           "in a pipeline");

@@ -7,6 +7,7 @@
 
 #include <piko/arithmetic.h>
 #include <piko/reference/check.h>
+#include <piko/reference/contracts.h>
 #include <piko/stage.h>
 
 namespace piko {
@@ -170,6 +171,7 @@ public:
   void allocateForSource(BufferBase &buffer, int source) {
     allocations.push_back({&buffer, source});
   }
+  void expect(Contract contract) { contracts.push_back(contract); }
 
 private:
   void endMembers() {
@@ -277,6 +279,7 @@ private:
   bool hasInput(const Node &node) const;
   void checkGraph() const;
   void prepareState();
+  void checkContract(const Contract &contract) const;
   std::vector<Component> prepareStages();
   StageOrder stageOrder(const std::vector<Component> &components) const;
 
@@ -286,6 +289,7 @@ private:
   std::vector<std::unique_ptr<Node>> nodes; ///< as declared
   std::vector<Source> sources;
   std::vector<Allocation> allocations;
+  std::vector<Contract> contracts;
   Fixed stateBytes;
   Cell domainExtent{0, 1, 1, 1};
   int domainRank = 0;
@@ -349,6 +353,32 @@ inline void Pipeline::prepareState() {
                   std::to_string(allocation.source));
     allocation.buffer->allocateZeroed(sources[allocation.source].count);
   }
+  for (const Contract &contract : contracts)
+    checkContract(contract);
+}
+
+inline void Pipeline::checkContract(const Contract &contract) const {
+  if (contract.buffer)
+    return contract.check(executor.checker);
+  std::string name = "source " + std::to_string(contract.source);
+  if (contract.source < 0 ||
+      contract.source >= static_cast<int>(sources.size()))
+    throw Error("expectIndex: expected one of the " +
+                std::to_string(sources.size()) + " sources, but got " + name);
+  const auto &[node, primitives, count] = sources[contract.source];
+  if (contract.rule.record != node->inputType)
+    node->fail(-1, "expected a field of '" +
+                       std::string(node->inputType->name) + "', which " + name +
+                       " has, but got one of '" +
+                       std::string(contract.rule.record->name) + "'");
+  std::string breach = contract.rule.findBreach(
+      executor.checker,
+      {primitives, count, static_cast<int64_t>(node->inputSize)},
+      [&](int64_t i) {
+        return "primitive " + std::to_string(i) + " of " + name;
+      });
+  if (!breach.empty())
+    node->fail(-1, breach);
 }
 
 inline std::vector<Component> Pipeline::prepareStages() {
@@ -542,6 +572,31 @@ protected:
   /// start of each run.
   template <class T> void allocateForSource(Buffer<T> &buffer, int source) {
     reference::Pipe<State>::run.allocateForSource(buffer, source);
+  }
+  /// The numbers of a field of a source's primitives, such as
+  /// &Triangle::vertex, are indices of a buffer, or below a number.
+  template <auto Field, class Limit>
+  void expectIndex(int source, const Limit &below) {
+    reference::Pipe<State>::run.expect(
+        {source, nullptr, reference::makeRule<Field>(below)});
+  }
+  /// The same for primitives of type T, which are integers.
+  template <class T, class Limit>
+  void expectIndex(int source, const Limit &below) {
+    reference::Pipe<State>::run.expect(
+        {source, nullptr, reference::makeRule<T>(below)});
+  }
+  /// The same for the elements of a buffer that no phase writes.
+  template <auto Field, class T, class Limit>
+  void expectIndex(Buffer<T> &of, const Limit &below) {
+    reference::Pipe<State>::run.expect(
+        {-1, &of, reference::makeRule<Field>(below)});
+  }
+  /// The same for elements that are integers.
+  template <class T, class Limit>
+  void expectIndex(Buffer<T> &of, const Limit &below) {
+    reference::Pipe<State>::run.expect(
+        {-1, &of, reference::makeRule<T>(below)});
   }
 };
 

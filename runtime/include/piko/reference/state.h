@@ -147,10 +147,18 @@ protected:
   ~ImageBase() = default;
 };
 
-/// What the pipeline has to know of a buffer that it allocates.
+/// What the pipeline has to know of a buffer.
 class BufferBase {
 public:
+  /// The host's elements.
+  struct View {
+    const std::byte *data;
+    int64_t count, size; ///< how many, and the bytes of one
+    bool isBound;
+    std::string_view type;
+  };
   virtual void allocateZeroed(int64_t count) = 0;
+  virtual View view() const = 0;
 
 protected:
   BufferBase() = default;
@@ -244,6 +252,10 @@ public:
   T *data() const {
     reference::expectHost("data()");
     return elements;
+  }
+  View view() const override {
+    return {reinterpret_cast<const std::byte *>(elements), count, sizeof(T),
+            isBound, reference::typeName<T>()};
   }
 
   // For both: in a phase for the elements in order, `for (T &x : buffer)`.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
-// What a pipeline is specialized for.
+// What a pipeline takes for granted of what the host gives it.
 
 #ifndef PIKO_DIALECT_PIKO_IR_PIKOFIXED_H
 #define PIKO_DIALECT_PIKO_IR_PIKOFIXED_H
