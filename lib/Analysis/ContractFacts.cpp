@@ -1,5 +1,5 @@
-//===- ContractFacts.cpp - Numbers of the host's that are indices ---------===//
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
+//===- ContractFacts.cpp - Numbers of the host's that are indices ---------===//
 //
 // What the runtime has tested before a kernel runs (piko.contract) holds of
 // each number that a phase reads. A read that fails gives 0 and the phase goes
