@@ -4,6 +4,8 @@
 # finds in the build tree and in the installed one, wherever that is moved to.
 #
 #   runtime        libpikort
+#   mpi            libpikort-mpi, where there is an MPI
+#   mpidevelopment what links it
 #   development    pikort's headers and the dialect's, the CMake package, static
 #                  libraries of the compiler
 #   tools          pikoc, piko-render, ..., and piko.h, which they read
@@ -21,6 +23,16 @@ set(PIKO_COMPONENTS runtime development documentation)
 set_target_properties(pikort PROPERTIES EXPORT_NAME runtime)
 install(TARGETS pikort EXPORT PikoTargets
   LIBRARY COMPONENT runtime NAMELINK_COMPONENT development)
+if(TARGET pikort-mpi)
+  list(APPEND PIKO_COMPONENTS mpi mpidevelopment)
+  set_target_properties(pikort-mpi PROPERTIES EXPORT_NAME mpi)
+  install(TARGETS pikort-mpi EXPORT PikoMPITargets
+    LIBRARY COMPONENT mpi NAMELINK_COMPONENT mpidevelopment)
+  install(EXPORT PikoMPITargets NAMESPACE Piko:: DESTINATION ${package_dir}
+    COMPONENT mpidevelopment)
+  export(EXPORT PikoMPITargets NAMESPACE Piko::
+    FILE ${build_package_dir}/PikoMPITargets.cmake)
+endif()
 install(DIRECTORY runtime/include/pikort DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   COMPONENT development)
 # The tools read what pipelines include.

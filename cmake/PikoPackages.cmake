@@ -100,6 +100,18 @@ piko_add_package(runtime libpikort${PIKO_ABI_VERSION}
   SUMMARY "runtime of compiled Piko pipelines"
   TEXT "${about} the shared library of compiled pipelines and their
 hosts.")
+piko_add_package(mpi libpikort-mpi${PIKO_ABI_VERSION}
+  SECTION libs SHARED "libpikort-mpi ${PIKO_ABI_VERSION}"
+  SUMMARY "Piko pipelines in several processes, by MPI"
+  TEXT "${about} what lets the processes of an MPI program run one
+pipeline together."
+  DEPENDS "${needed}")
+piko_add_package(mpidevelopment libpikort-mpi-dev SECTION libdevel
+  SUMMARY "links applications to Piko's ranks by MPI"
+  TEXT "${about} what applications are built with whose processes run
+one pipeline together; the headers are in libpiko-dev."
+  DEPENDS "libpikort-mpi${PIKO_ABI_VERSION} (= ${version})" "libpiko-dev (= ${version})"
+    "libopenmpi-dev | libmpich-dev")
 piko_add_package(tools piko-tools SECTION devel
   SUMMARY "compiler and tools for programmable graphics pipelines"
   TEXT "${about} pikoc, which compiles pipelines, piko.h, which they

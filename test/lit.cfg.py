@@ -42,7 +42,7 @@ PIKO_TEST_AARCH64=aarch64 has %compare_targets run cases on AArch64 alone.
 PIKO_TEST_ALL=1 asks for all tests, as `make check-all` does. Features: `all` where
 that is so, `bunny` where that mesh is installed, `gpu` where an NVIDIA driver
 is, `aarch64` where Debian's compiler for it and qemu are, `on-aarch64` where
-PIKO_TEST_AARCH64 is set, `ptxas` where NVIDIA's assembler is, `chromium` and `doxygen`
+PIKO_TEST_AARCH64 is set, `mpi` where ranks may be processes, `ptxas` where NVIDIA's assembler is, `chromium` and `doxygen`
 where these are, `asan` and `tsan` in builds with that sanitizer, `fork-server` where
 tools fork.
 """
@@ -213,6 +213,8 @@ if os.path.exists("/dev/nvidiactl"):
     config.available_features.add("gpu")
 if platform.machine() in ("x86_64", "AMD64"):
     config.available_features.add("x86_64")
+if config.mpirun:
+    config.available_features.add("mpi")
 # NVIDIA's installers leave PATH as it is.
 cuda = os.environ.get("CUDA_HOME", "/usr/local/cuda")
 if not shutil.which("ptxas"):

@@ -4,10 +4,10 @@
 # check-packages.sh [--folder FOLDER] [--keep] PACKAGES
 #
 # Installs the Debian packages of a folder, as `make packages` leaves them, on a bare
-# Debian 12, and does there what their users do: builds the tutorial's application and
-# the project of docs/OutOfTree.md by the documents' own commands, renders the bunny, draws
-# it from Python, reads a manual page, completes a command line, and takes the packages away again. Lintian
-# looks at them, too. As root or through sudo; also `make package-check`.
+# Debian 12, and does there what their users do: builds the applications of the tutorial
+# and of docs/Scale.md and the project of docs/OutOfTree.md by the documents' own
+# commands, renders the bunny, draws it from Python, reads a manual page, completes a
+# command line, and takes the packages away again. Lintian looks at them, too. As root or through sudo; also `make package-check`.
 #
 #   --folder FOLDER  where its root is made (a new folder of the temporary ones)
 #   --keep           leaves it there; with --folder the next run goes on with it
@@ -55,7 +55,7 @@ step 'every library is found' \
      ! ldd "$file" | grep "not found"
    done'
 step 'what others need' "$install cmake g++ make python3 libmlir-22-dev llvm-22-dev mlir-22-tools \
-  glmark2-data man-db bash-completion zsh lintian"
+  glmark2-data openmpi-bin man-db bash-completion zsh lintian"
 
 step 'documents lead to what is installed' "python3 install-documents.py --check $doc"
 step 'an application, as the tutorial makes it' \
@@ -67,6 +67,13 @@ step 'a pass out of tree' \
      $doc/docs/OutOfTree.md >out-of-tree/commands.sh
    (cd out-of-tree && PIKO=/usr sh -e commands.sh)
    grep -q 'bins \[16, 16\]' out-of-tree/larger.mlir"
+# As root, and with more processes than cores.
+readonly mpi='export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
+  OMPI_MCA_rmaps_base_oversubscribe=1'
+step 'an application in several processes' \
+  "$mpi; python3 check-tutorial.py --piko /usr --work disks $doc/docs/Scale.md
+   mpirun -np 2 piko-render --mpi $doc/examples/raster/raster.piko.cpp --pipe Fused \
+     /usr/share/glmark2/models/bunny.obj --width 320 --height 240 --warmup 0 --frames 1"
 step 'the bunny' \
   "piko-render $doc/examples/raster/raster.piko.cpp --pipe Fused \
      /usr/share/glmark2/models/bunny.obj --width 1024 --height 768 --out bunny.png

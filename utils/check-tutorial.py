@@ -34,6 +34,7 @@ MARK = "=== next fence ==="
 # Pages that write all of their files.
 FILES = {
     "Tutorial": {"spheres.piko.cpp", "main.cpp", "CMakeLists.txt"},
+    "Scale": {"disks.piko.cpp", "main.cpp", "CMakeLists.txt"},
     "Levels": {
         "dots.mlir",
         "main.cpp",

@@ -110,6 +110,37 @@ TEST_F(Ranks, Combine) {
   EXPECT_EQ(pikort_get_rank_totals(pipe.get(), 120, &totals), PIKORT_NOT_FOUND);
 }
 
+// In C++ a communicator outlives what its host keeps, and an error is said.
+TEST_F(Ranks, Communicators) {
+  std::vector<pikort_ranks> two(2);
+  ASSERT_EQ(pikort_make_thread_ranks(2, two.data()), PIKORT_OK);
+  std::vector<int64_t> otherSum = sum, otherMost = most;
+  std::thread other([&] {
+    piko::rt::Pipeline second{program};
+    EXPECT_TRUE(second.domain({1}));
+    EXPECT_TRUE(second.source(0, items));
+    EXPECT_TRUE(second.buffer("sum", otherSum));
+    EXPECT_TRUE(second.buffer("most", otherMost));
+    EXPECT_TRUE(second.ranks(piko::rt::Communicator(two[1])));
+    EXPECT_TRUE(second.run());
+  });
+  EXPECT_TRUE(pipe.ranks(piko::rt::Communicator(two[0])));
+  piko::rt::Pipeline moved = std::move(pipe);
+  auto status = moved.run();
+  other.join();
+  EXPECT_TRUE(status) << status.message();
+  EXPECT_EQ(sum[0], 6050);
+  EXPECT_EQ(otherSum[0], 6050);
+  pikort_ranks wrong = two[0];
+  wrong.rank = 2;
+  piko::rt::Status refused = moved.ranks(piko::rt::Communicator(wrong));
+  EXPECT_EQ(refused.code(), PIKORT_INVALID_ARGUMENT);
+  EXPECT_NE(refused.message().find("but got 2 of 2"), std::string::npos)
+      << refused.message();
+  EXPECT_EQ(moved.threadRanks(-1).code(), PIKORT_INVALID_ARGUMENT);
+  pikort_free_thread_ranks(two.data());
+}
+
 // An error is that of one process, whichever rank has found it, and the next
 // run is as if there had been none.
 TEST_F(Ranks, Errors) {

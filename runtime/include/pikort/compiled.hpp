@@ -84,6 +84,14 @@ public:
     return pipe.mappings(setting.c_str());
   }
   CheckedStatus setLoopLimit(int64_t limit) { return pipe.loopLimit(limit); }
+  /// Makes it one rank of several, of a program that pikoc --ranks has made.
+  CheckedStatus setRanks(const Communicator &communicator) {
+    return pipe.ranks(communicator);
+  }
+  /// Makes it several ranks in threads of this process.
+  CheckedStatus setThreadRanks(int32_t count) {
+    return pipe.threadRanks(count);
+  }
 
   /// The primitives of a source. Uses the caller's memory, which must outlive
   /// the runs. A pointer to void is not checked for its type.

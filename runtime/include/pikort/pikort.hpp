@@ -21,8 +21,10 @@
 #include "piko/status.h"
 #include "pikort/device.hpp"
 #include "pikort/pikort.h"
+#include "pikort/ranks.hpp"
 
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -73,9 +75,11 @@ public:
     created_ = status(code);
   }
   Pipeline(Pipeline &&other) noexcept
-      : handle_(std::exchange(other.handle_, nullptr)),
+      : ranks_(std::move(other.ranks_)),
+        handle_(std::exchange(other.handle_, nullptr)),
         created_(std::move(other.created_)) {}
   Pipeline &operator=(Pipeline &&other) noexcept {
+    std::swap(ranks_, other.ranks_);
     std::swap(handle_, other.handle_);
     std::swap(created_, other.created_);
     return *this;
@@ -117,6 +121,19 @@ public:
   }
   Status loopLimit(int64_t limit) {
     return status(pikort_set_loop_limit(handle_, limit));
+  }
+  /// Makes it one rank of several; see pikort_set_ranks.
+  Status ranks(const Communicator &communicator) {
+    if (!communicator.created())
+      return communicator.created();
+    Status done = status(pikort_set_ranks(handle_, communicator.get()));
+    if (done)
+      ranks_ = communicator;
+    return done;
+  }
+  /// Makes it several ranks in threads; see pikort_set_thread_ranks.
+  Status threadRanks(int32_t count) {
+    return status(pikort_set_thread_ranks(handle_, count));
   }
   template <class T> Status constant(const char *name, const T &value) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -206,6 +223,7 @@ private:
     return Status(code, pikort_message(handle_));
   }
 
+  std::optional<Communicator> ranks_; // outlives the pipeline
   pikort_pipeline *handle_ = nullptr;
   Status created_;
 };
