@@ -32,21 +32,17 @@ public:
 private:
   struct Made {
     Status status;
-    std::shared_ptr<pikort_ranks> ranks;
+    SharedRanks ranks;
   };
 
   explicit MPICommunicator(Made made)
       : Communicator(std::move(made.status), std::move(made.ranks)) {}
 
   static Made make(MPI_Comm communicator, double seconds) {
-    std::shared_ptr<pikort_ranks> ranks(new pikort_ranks{},
-                                        [](pikort_ranks *old) {
-                                          pikort_free_mpi_ranks(old);
-                                          delete old;
-                                        });
+    SharedRanks ranks(pikort_ranks{}, pikort_free_mpi_ranks);
     int32_t code = pikort_make_mpi_ranks(&communicator, seconds, ranks.get());
     const char *why =
-        ranks->message ? ranks->message(ranks->context)
+        ranks.get()->message ? ranks.get()->message(ranks.get()->context)
                        : "MPI's communicator: expected a limit of at least 0 "
                          "seconds, and memory";
     return {Status(code, why), std::move(ranks)};

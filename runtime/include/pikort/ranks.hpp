@@ -13,10 +13,41 @@
 #include "piko/status.h"
 #include "pikort/ranks.h"
 
-#include <memory>
 #include <utility>
 
 namespace piko::rt {
+
+/// Ranks that copies share; the last one frees them. (std::shared_ptr's header
+/// brings all names of <unistd.h>, such as pipe, into a host's file.)
+class SharedRanks {
+public:
+  /// `free`, if any, is called before the memory of the ranks is given back.
+  SharedRanks(const pikort_ranks &ranks, void (*free)(pikort_ranks *))
+      : owned_(new Owned{ranks, free, 1}) {}
+  SharedRanks(const SharedRanks &other) : owned_(other.owned_) {
+    __atomic_add_fetch(&owned_->users, 1, __ATOMIC_RELAXED);
+  }
+  SharedRanks &operator=(SharedRanks other) {
+    std::swap(owned_, other.owned_);
+    return *this;
+  }
+  ~SharedRanks() {
+    if (__atomic_sub_fetch(&owned_->users, 1, __ATOMIC_ACQ_REL) > 0)
+      return;
+    if (owned_->free)
+      owned_->free(&owned_->ranks);
+    delete owned_;
+  }
+  pikort_ranks *get() const { return &owned_->ranks; }
+
+private:
+  struct Owned {
+    pikort_ranks ranks;
+    void (*free)(pikort_ranks *);
+    int64_t users;
+  };
+  Owned *owned_;
+};
 
 /// This process, or thread, as one rank of several. Copies are the same one,
 /// and pipelines that have been given one keep it.
@@ -24,8 +55,7 @@ class Communicator {
 public:
   /// Of a host's own network; what the context points to outlives the runs.
   explicit Communicator(const pikort_ranks &ranks)
-      : Communicator(Status(),
-                     std::shared_ptr<pikort_ranks>(new pikort_ranks(ranks))) {}
+      : Communicator(Status(), SharedRanks(ranks, nullptr)) {}
 
   /// How the creation went; a pipeline that is given one that failed says it.
   const Status &created() const { return created_; }
@@ -35,12 +65,12 @@ public:
   const pikort_ranks *get() const { return ranks_.get(); }
 
 protected:
-  Communicator(Status created, std::shared_ptr<pikort_ranks> ranks)
+  Communicator(Status created, SharedRanks ranks)
       : created_(std::move(created)), ranks_(std::move(ranks)) {}
 
 private:
   Status created_;
-  std::shared_ptr<pikort_ranks> ranks_;
+  SharedRanks ranks_;
 };
 
 } // namespace piko::rt
