@@ -32,7 +32,7 @@ DIRECTIVES = re.compile(r"piko\.set_\w+")
 # others. test/Dialect/Piko/Program/program.mlir has them whole. Nor is there a grid.
 PROGRAM_OPS = re.compile(
     r"piko\.(clear|feed|join|launch|leave|wait|schedule_bins|strips|waves|rounds"
-    r"|partition|exchange|keep|share|gpu\.\w+)\b"
+    r"|partition|exchange|keep|common|share|gpu\.\w+)\b"
 )
 LIST_OPS = re.compile(r"piko\.(list_\w+|parallel_for)\b")
 BARRIERS = re.compile(r"piko\.(sync|reduce|scan|sort|grouped)\b")
