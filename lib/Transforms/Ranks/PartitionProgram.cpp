@@ -376,6 +376,7 @@ bool Partitioner::staysInBin(EdgeOp edge) {
   auto from = lookupInPipeline<StageOp>(edge, edge.getProducerAttr());
   auto to = lookupInPipeline<StageOp>(edge, edge.getConsumerAttr());
   return divisionOf(from) == RankDivision::Bins &&
+         divisionOf(to) == RankDivision::Bins &&
          haveSameOwners(from, to, divisions) && keepsBin(edge);
 }
 

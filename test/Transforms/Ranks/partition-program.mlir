@@ -256,3 +256,50 @@ piko.pipeline @Loops rank 1 {
     }
   }
 }
+
+// What stays in its bin comes to the first rank all the same, where that alone
+// runs the stage: of two kinds of atomics the order shows.
+// CHECK-LABEL:   piko.pipeline @First
+// CHECK:         piko.program ranks {
+// CHECK-NEXT:      piko.partition @draw bins
+// CHECK-NOT:       piko.partition
+// CHECK:           %[[ALL:.*]] = piko.launch @kernel_draw
+// CHECK:           %[[HERE:.*]] = piko.exchange %[[ALL]]
+// CHECK:           piko.join @count(concatenate %[[HERE]] keys 2)
+piko.pipeline @First rank 2 {
+  piko.buffer @counts : @N
+  piko.source @draw
+  piko.edge @draw[0] -> @count
+  piko.stage @draw bins [8, 8] threads 64 : @F -> [@F] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      %b = piko.bin_at %x, %y : i32, i32
+      piko.assign_to %b
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %x = piko.get %f "x" : !piko.prim<@F> -> i32
+      %y = piko.get %f "y" : !piko.prim<@F> -> i32
+      piko.emit 0 (%x, %y) : i32, i32
+      piko.return
+    }
+  }
+  piko.stage @count bins [8, 8] threads 64 : @F -> [] {
+    piko.assign {
+    ^bb0(%f: !piko.prim<@F>):
+      piko.assign_previous
+      piko.return
+    }
+    piko.process {
+    ^bb0(%f: !piko.prim<@F>):
+      %one = arith.constant 1 : i32
+      %i = arith.constant 0 : index
+      piko.atomic add @counts[%i : index] "n", %one : i32
+      piko.atomic min_signed @counts[%i : index] "n", %one : i32
+      piko.return
+    }
+  }
+}
