@@ -168,10 +168,15 @@ struct Source {
   bool onDevice = false; ///< What is bound is a device's memory.
   Array<uint8_t> mirror; ///< What a device sees of the host's own memory, ...
   DeviceBytes twin;      ///< ... and what frames of it see, ...
-  bool twinIsCurrent = false;     ///< ... if it is what was bound.
-  const uint8_t *hosts = nullptr; ///< That memory meanwhile.
-  int64_t begin = 0, end = 0;     ///< The strip that runs, or all.
-  bool exchanged = false;         ///< Between ranks: its bins.
+  bool twinIsCurrent = false;           ///< ... if it is what was bound.
+  const uint8_t *hosts = nullptr;       ///< That memory meanwhile.
+  int64_t stripBegin = 0, stripEnd = 0; ///< The strip that runs, or all, ...
+  int64_t begin = 0, end = 0;           ///< ... and what of it this rank has.
+  bool exchanged = false;               ///< Between ranks: its bins.
+  void takeStrip(int64_t first, int64_t last) {
+    stripBegin = begin = first;
+    stripEnd = end = last;
+  }
 };
 
 /// What a kernel does to a field of a piece of state: see PrivateCopies.h.

@@ -13,6 +13,7 @@
 
 #include "cpu/CPUExecutor.h"
 #include "cpu/Queue.h"
+#include "cpu/loops/Strips.h"
 #include "ranks/Ranks.h"
 
 #include <algorithm>
@@ -289,7 +290,9 @@ static Stream concatenate(pikort_pipeline &p, std::vector<Stream> &streams,
 
 /// What has come of an edge so far.
 static Stream takeEdge(pikort_pipeline &p, Edge &edge) {
-  if (cycleOf(p, p.stages[edge.producer]))
+  const Stage &from = p.stages[edge.producer];
+  Strips *strips = edge.leavesStrips ? stripsOf(p, from) : nullptr;
+  if (cycleOf(p, from) || (strips && strips->isDivided()))
     return queueOf(p, edge).take(edge.keyWidth);
   return gatherEdge(p, edge);
 }
@@ -386,7 +389,8 @@ void Ranks::filter(const Stage &stage, Items &items, Array<uint32_t> &storage) {
 bool Ranks::isDivided(const Source &source) const {
   // A meeting takes as long as some thousands of primitives.
   constexpr int64_t few = 4096;
-  return source.exchanged && size() > 1 && source.count >= few;
+  return source.exchanged && size() > 1 &&
+         source.stripEnd - source.stripBegin >= few;
 }
 
 void Ranks::exchangeSource(int32_t index) {
@@ -421,8 +425,7 @@ void Ranks::exchangeSource(int32_t index) {
       std::memcpy(to, list.data, static_cast<size_t>(list.bytes));
     to += list.bytes;
   }
-  source.begin = 0;
-  source.end = source.count;
+  source.takeStrip(source.stripBegin, source.stripEnd);
 }
 
 bool Ranks::takeBuckets(int32_t source, Array<uint32_t> &buckets) {

@@ -4,7 +4,7 @@
 #include "ranks/Ranks.h"
 
 #include "cpu/CPUExecutor.h"
-#include "cpu/Kernel.h"
+#include "cpu/Queue.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -55,19 +55,41 @@ void Ranks::balanceOwners() {
 }
 
 void Ranks::beginRun() {
-  for (Source &source : p_.sources) {
-    const Stage &stage = p_.stages[source.stage];
-    if (stage.partition == PIKOIR_PARTS || isDivided(source)) {
-      auto part = [&](int64_t number) {
-        return static_cast<int64_t>(static_cast<__int128>(source.count) *
-                                    number / size());
-      };
-      source.begin = part(rank());
-      source.end = part(rank() + 1);
-    } else if (stage.partition == PIKOIR_FIRST_RANK && rank() != 0) {
-      source.begin = source.end = 0;
-    }
+  for (Source &source : p_.sources)
+    takePart(source);
+}
+
+void Ranks::takePart(Source &source) const {
+  const Stage &stage = p_.stages[source.stage];
+  int64_t first = source.stripBegin, count = source.stripEnd - first;
+  if (stage.partition == PIKOIR_PARTS || isDivided(source)) {
+    auto part = [&](int64_t number) {
+      return first + static_cast<int64_t>(static_cast<__int128>(count) *
+                                          number / size());
+    };
+    source.begin = part(rank());
+    source.end = part(rank() + 1);
+  } else if (stage.partition == PIKOIR_FIRST_RANK && rank() != 0) {
+    source.end = first;
   }
+}
+
+// --- Strips -----------------------------------------------------------------
+
+int64_t Ranks::agreeOnStrip(int64_t proposed, bool failed) {
+  std::vector<int64_t> all =
+      meet(failed ? Going::Failed : Going::On,
+           std::vector<int64_t>(static_cast<size_t>(size()), proposed));
+  return *std::min_element(all.begin(), all.end());
+}
+
+void Ranks::takeBack(const StripGroup &group) {
+  agreed_ = false;
+  sourceBuckets_.erase(group.source);
+  for (int32_t s : group.stages)
+    for (int32_t e : p_.stages[s].outputs)
+      if (e >= 0 && p_.edges[e].exchanged && !p_.edges[e].leavesStrips)
+        queueOf(p_, p_.edges[e]).reset();
 }
 
 void Ranks::noteBins(const Stage &stage, const Kernel &kernel) {

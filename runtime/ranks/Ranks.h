@@ -63,6 +63,15 @@ public:
   void prepareRun();
   /// Takes this rank's part of the sources.
   void beginRun();
+  /// Takes this rank's part of a source's strip.
+  void takePart(Source &source) const;
+  /// The smallest size of a strip that a rank proposes. Throws, also if another
+  /// rank has failed.
+  int64_t agreeOnStrip(int64_t proposed, bool failed);
+  /// Whether an error of this run is known to all.
+  bool hasAgreed() const { return agreed_; }
+  /// Goes on after an error that all know: drops what came in the strip.
+  void takeBack(const StripGroup &group);
   /// The memory of an image that is common; null: it is this rank's own.
   uint8_t *commonMemory(const State &state) const;
   /// Which bins a kernel runs.

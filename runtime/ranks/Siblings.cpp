@@ -50,6 +50,7 @@ void Siblings::bind(Sibling &sibling) {
   check(sibling, pikort_set_memory_limit(to, first_.memory.limit()));
   check(sibling, pikort_set_memory_budget(to, first_.memory.budget()));
   to->wantedThreads = first_.wantedThreads;
+  to->stripSize = first_.stripSize;
   to->loopLimit = first_.loopLimit;
   to->rankOwners = first_.rankOwners;
   for (size_t s = 0; s < first_.states.size(); ++s) {

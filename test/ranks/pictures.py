@@ -4,9 +4,11 @@
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe"]
@@ -36,6 +38,34 @@ def check_error(args, ranks):
     if done.returncode == 0 or len(errors) != 1 or "out of memory" not in errors[0] \
             or "rank " not in errors[0]:
         sys.exit(f"expected one error that names a rank, but got: {done.stderr}")
+
+
+def write_waves(path, side=40):
+    """A mesh of some thousand triangles, of which many cover each other."""
+    corners = [(x / side, y / side, math.sin(x * 0.9) * math.cos(y * 0.7))
+               for y in range(side + 1) for x in range(side + 1)]
+    with open(path, "w") as file:
+        for corner in corners:
+            print("v", *corner, file=file)
+        for y in range(side):
+            for x in range(side):
+                a = y * (side + 1) + x + 1
+                print("f", a, a + 1, a + side + 2, file=file)
+                print("f", a, a + side + 2, a + side + 1, file=file)
+
+
+def check_strips(args, scene):
+    """Ranks run a source in strips, of a size or of what memory there is."""
+    write_waves(scene)
+    for example, pipe in [("raster", "Fused"), ("visibility", "Visibility")]:
+        file = Path(args.examples) / example / f"{example}.piko.cpp"
+        options = [str(file), "--pipe", pipe, scene]
+        expected = render(args, [], options)
+        for limit in (["--strip", "100"], ["--memory-budget", "400000"]):
+            got = render(args, [*MPIRUN, "-np", "3"], ["--mpi", *options, *limit])
+            if got != expected:
+                sys.exit(f"{pipe}, {limit[0]} on 3 ranks: expected {expected}, but got "
+                         f"{got}")
 
 
 def check_settings(args):
@@ -73,6 +103,8 @@ def main():
             if got != expected:
                 sys.exit(f"{pipe} on {ranks} ranks: expected {expected}, but got {got}")
             print(f"{pipe} on {ranks} ranks: {got}")
+    with tempfile.TemporaryDirectory() as folder:
+        check_strips(args, f"{folder}/waves.obj")
     check_settings(args)
     check_error(args, 3)
 

@@ -68,8 +68,8 @@ def PartitionProgram : Pass<"piko-partition-program", "::piko::PipelineOp"> {
     before (`piko.keep`, `piko.share`), or only to the owners of pixels if these use them
     next, and what is left at the end goes to the first rank. `piko.common` names images
     of which each rank uses its own bins alone. `direct_map` asks for owners of
-    neighbouring bins. Each
-    `piko.strips` is taken apart, as ranks meet between the launches of a strip.
+    neighbouring bins. Of each strip ranks have a part; a `piko.strips` that has cycles,
+    or would share state from one strip to the next, is taken apart.
 
     **Guarantees** that each bin takes what it did, in the same order, for any number
     of ranks, and that all ranks run the same exchanges in the same order.

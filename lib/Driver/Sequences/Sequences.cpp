@@ -106,7 +106,7 @@ void piko::addSynthesisSequence(OpPassManager &passes,
   if (options.has("fuse-kernels"))
     pipeline.addPass(createFuseKernels());
   pipeline.addPass(createFormProgram());
-  if (options.has("form-strips") && !options.ranks)
+  if (options.has("form-strips"))
     pipeline.addPass(createFormStrips());
   if (options.ranks)
     pipeline.addPass(createPartitionProgram());

@@ -23,8 +23,12 @@ bool isInBin(mlir::Operation *access);
 /// Whether bins of both stages that are at one place have one owner.
 bool haveSameOwners(StageOp a, StageOp b, const Divisions &divisions);
 
+/// Puts the statements of strips in place of these; gives the first one.
+mlir::Operation *takeApart(StripsOp strips);
+
 /// Puts `piko.keep`, `piko.share` and `piko.common` into a program where ranks
-/// use state that others have written.
+/// use state that others have written. Takes strips apart that would share
+/// state from one to the next.
 void shareState(ProgramOp program, const Divisions &divisions);
 
 //===----------------------------------------------------------------------===//

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-partition-program:
-//   1. take strips apart, as ranks meet between the launches of a strip;
+//   1. take strips with cycles apart, as ranks would meet in each wave;
 //   2. find who runs each kernel, and say so;
 //   3. make exchanges of the edges that lead from one rank to another;
 //   4. give keys to what is exchanged, and to what leads there;
@@ -39,7 +39,7 @@ public:
       : program(program), pipeline(getPipeline(program)),
         builder(program.getContext()) {}
 
-  void takeStripsApart();
+  void prepareStrips();
   void divide();
   void exchange();
   void setKeys();
@@ -48,6 +48,7 @@ public:
   unsigned divided = 0, replicated = 0, exchanges = 0;
 
 private:
+  template <class Function> void forStatements(Function function);
   void divide(LaunchOp launch);
   void divide(WavesOp waves);
   void set(LaunchOp launch, RankDivision division, const std::string &why);
@@ -74,19 +75,41 @@ private:
 
 } // namespace
 
-void Partitioner::takeStripsApart() {
+Operation *piko::takeApart(StripsOp strips) {
+  Block &body = strips.getBody().front();
+  Operation *first = &body.front();
+  auto leave = cast<LeaveOp>(body.getTerminator());
+  for (auto [result, value] : llvm::zip(strips.getEdges(), leave.getLeaving()))
+    result.replaceAllUsesWith(value);
+  body.getArgument(0).replaceAllUsesWith(strips.getSource());
+  if (first == leave)
+    first = strips->getNextNode();
+  leave.erase();
+  strips->getBlock()->getOperations().splice(strips->getIterator(),
+                                             body.getOperations());
+  strips.erase();
+  return first;
+}
+
+/// How long a strip is, ranks agree on when they run.
+void Partitioner::prepareStrips() {
   for (auto strips :
        llvm::make_early_inc_range(program.getBodyBlock()->getOps<StripsOp>())) {
+    strips.removeChunkAttr();
     Block &body = strips.getBody().front();
-    auto leave = cast<LeaveOp>(body.getTerminator());
-    for (auto [result, value] :
-         llvm::zip(strips.getEdges(), leave.getLeaving()))
-      result.replaceAllUsesWith(value);
-    body.getArgument(0).replaceAllUsesWith(strips.getSource());
-    leave.erase();
-    strips->getBlock()->getOperations().splice(strips->getIterator(),
-                                               body.getOperations());
-    strips.erase();
+    if (!body.getOps<WavesOp>().empty() || !body.getOps<RoundsOp>().empty())
+      takeApart(strips);
+  }
+}
+
+/// Calls a function for each statement, those of strips among them.
+template <class Function> void Partitioner::forStatements(Function function) {
+  for (Operation &op : llvm::make_early_inc_range(*program.getBodyBlock())) {
+    function(op);
+    if (auto strips = dyn_cast<StripsOp>(op))
+      for (Operation &inner :
+           llvm::make_early_inc_range(strips.getBody().front()))
+        function(inner);
   }
 }
 
@@ -180,8 +203,8 @@ std::string Partitioner::whyNotDivided(LaunchOp launch) {
 bool Partitioner::isReplicated(LaunchOp launch, RankDivision division) {
   KernelOp kernel = launch.getKernelOp();
   auto join = launch.getInput().getDefiningOp<JoinOp>();
-  if (launch->getParentOp() != program || launch.getNumResults() > 0 || !join ||
-      division != RankDivision::Parts)
+  if (!isa<ProgramOp, StripsOp>(launch->getParentOp()) ||
+      launch.getNumResults() > 0 || !join || division != RankDivision::Parts)
     return false;
   for (Value edge : join.getEdges())
     if (!isa_and_nonnull<SourceOp>(getOrigin(edge)))
@@ -320,21 +343,26 @@ void Partitioner::divide() {
   findRankOrder();
 }
 
-/// Parts of a source are consecutive, and so is what follows from them.
+/// Whether an edge holds what several strips have left, one after the other.
+static bool leavesStrips(Value edge) { return edge.getDefiningOp<StripsOp>(); }
+
+/// Parts of a source, or of a strip of it, are consecutive, and so is what
+/// follows from them.
 void Partitioner::findRankOrder() {
-  for (Operation &op : *program.getBodyBlock()) {
+  forStatements([&](Operation &op) {
     if (!isa<JoinOp, WavesOp>(op))
-      continue;
+      return;
     llvm::SmallPtrSet<Operation *, 2> roots;
     for (Value edge : op.getOperands()) {
       Operation *origin = getOrigin(edge);
       auto from = dyn_cast_or_null<EdgeOp>(origin);
-      roots.insert(from ? rankOrder.lookup(lookupInPipeline<StageOp>(
-                              from, from.getProducerAttr()))
-                        : origin);
+      roots.insert(leavesStrips(edge) ? nullptr
+                   : from ? rankOrder.lookup(lookupInPipeline<StageOp>(
+                                from, from.getProducerAttr()))
+                          : origin);
     }
     if (roots.size() != 1 || !*roots.begin())
-      continue;
+      return;
     auto note = [&](StageOp stage) {
       if (divisionOf(stage) == RankDivision::Parts)
         rankOrder[stage] = *roots.begin();
@@ -347,7 +375,7 @@ void Partitioner::findRankOrder() {
       for (auto launch : cast<WavesOp>(op).getOps<LaunchOp>())
         llvm::for_each(getStages(launch.getKernelOp()), note);
     }
-  }
+  });
 }
 
 //===----------------------------------------------------------------------===//
@@ -410,12 +438,13 @@ void Partitioner::exchange(OpOperand &operand, RankDivision to) {
   operand.set(
       ExchangeOp::create(builder, edge.getLoc(), value.getType(), value));
   ++exchanges;
-  if (from != RankDivision::First && !rankOrder.contains(producer))
+  if (from != RankDivision::First &&
+      (!rankOrder.contains(producer) || leavesStrips(value)))
     exchanged.insert(edge);
 }
 
 void Partitioner::exchange() {
-  for (Operation &op : llvm::make_early_inc_range(*program.getBodyBlock())) {
+  forStatements([&](Operation &op) {
     RankDivision to = RankDivision::First; // of cycles that are not divided
     if (auto join = dyn_cast<JoinOp>(op))
       to = divisionOf(join.getStageOp());
@@ -423,10 +452,10 @@ void Partitioner::exchange() {
       to = divisionOf(
           getStages((*waves.getOps<LaunchOp>().begin()).getKernelOp()).front());
     else if (!isa<RoundsOp>(op))
-      continue;
+      return;
     for (OpOperand &operand : op.getOpOperands())
       exchange(operand, to);
-  }
+  });
 }
 
 //===----------------------------------------------------------------------===//
@@ -472,7 +501,7 @@ void PartitionProgramPass::runOnOperation() {
     return markAllAnalysesPreserved();
   program.setRanks(true);
   Partitioner partitioner(program);
-  partitioner.takeStripsApart();
+  partitioner.prepareStrips();
   partitioner.divide();
   partitioner.exchange();
   partitioner.setKeys();

@@ -4,7 +4,9 @@
 // that is the same on all ranks, or has been written since in one of three
 // ways: by the first rank alone, by owners in their bins, or anywhere. A
 // statement that uses it otherwise than so shares it before. What is written
-// anywhere is found by comparison with what was kept.
+// anywhere is found by comparison with what was kept. All strips of a source
+// use state as the first one does, and what that needs is done before them;
+// strips that would need it again are taken apart.
 
 #include "Ranks/Partition.h"
 #include "Support/StateAccess.h"
@@ -55,6 +57,13 @@ public:
 
 private:
   void visit(Operation *statement);
+  void visitAll(Block &statements);
+  bool isSharedOnce(StripsOp strips);
+  /// Where something is done before a statement, or before its strips.
+  void setInsertionPoint(Operation *statement) {
+    builder.setInsertionPoint(
+        program.getBodyBlock()->findAncestorOpInBlock(*statement));
+  }
   void use(Operation *statement, Attribute state, const Use &use,
            RankDivision division, StageOp stage);
   bool continues(const Written &before, const Use &use, Way way,
@@ -70,6 +79,8 @@ private:
   OpBuilder builder;
   llvm::MapVector<Attribute, Written> written;
   llvm::MapVector<Attribute, History> histories;
+  bool onlyCounts = false; ///< Makes no statements.
+  int64_t made = 0;        ///< Statements, or those that were counted.
 };
 
 } // namespace
@@ -114,9 +125,15 @@ void StateSharer::share(Attribute state, bool atEnd, StageOp to) {
                   lookupInPipeline<ImageOp>(program, name);
   if (now.way == Way::Clean || (now.way == Way::FirstRank && toFirst))
     return;
-  FlatSymbolRefAttr owner;
-  if (toOwners)
+  if (toOwners) {
     now.stage = to;
+    written[state].way = Way::Owners;
+    written[state].stage = to;
+  }
+  ++made;
+  if (onlyCounts)
+    return;
+  FlatSymbolRefAttr owner;
   if (now.way == Way::Owners || toOwners)
     owner = FlatSymbolRefAttr::get(now.stage.getSymNameAttr());
   SmallVector<Attribute> reduce;
@@ -132,10 +149,6 @@ void StateSharer::share(Attribute state, bool atEnd, StageOp to) {
                   unit(now.way == Way::FirstRank), unit(toFirst),
                   unit(toOwners),
                   reduce.empty() ? ArrayAttr() : builder.getArrayAttr(reduce));
-  if (toOwners) {
-    written[state].way = Way::Owners;
-    written[state].stage = to;
-  }
 }
 
 /// Whether a statement may use the state as it is on each rank, because it uses
@@ -175,7 +188,7 @@ void StateSharer::note(Attribute state, bool writes, bool isOwners,
 
 void StateSharer::use(Operation *statement, Attribute state, const Use &use,
                       RankDivision division, StageOp stage) {
-  builder.setInsertionPoint(statement);
+  setInsertionPoint(statement);
   bool writes = use.kinds & ~StateAccess::reads;
   bool isOwners = division == RankDivision::Bins && use.staysInBin;
   Way way = !writes || division == RankDivision::All ? Way::Clean
@@ -193,8 +206,11 @@ void StateSharer::use(Operation *statement, Attribute state, const Use &use,
     return;
   Written &now = written[state];
   if (way == Way::Anywhere && now.way == Way::Clean) {
-    KeepOp::create(builder, statement->getLoc(), cast<FlatSymbolRefAttr>(state),
-                   isCleared ? builder.getUnitAttr() : UnitAttr());
+    ++made;
+    if (!onlyCounts)
+      KeepOp::create(builder, statement->getLoc(),
+                     cast<FlatSymbolRefAttr>(state),
+                     isCleared ? builder.getUnitAttr() : UnitAttr());
     now.onlyAtomics = use.kinds == StateAccess::changesAtomically;
   }
   now.way = way;
@@ -239,13 +255,38 @@ void StateSharer::declareCommon() {
   }
 }
 
+void StateSharer::visitAll(Block &statements) {
+  Operation *next = nullptr;
+  for (Operation *op = &statements.front(); op; op = next) {
+    next = op->getNextNode();
+    auto strips = dyn_cast<StripsOp>(op);
+    if (strips && !isSharedOnce(strips)) {
+      strips.emitRemark() << "ranks run no strips of the source, as they would "
+                             "share state after each";
+      next = takeApart(strips);
+    } else if (strips) {
+      visitAll(strips.getBody().front());
+    } else if (isa<LaunchOp, WavesOp, RoundsOp>(op)) {
+      visit(op);
+    }
+  }
+}
+
+/// Whether a second strip uses state as the first one has left it.
+bool StateSharer::isSharedOnce(StripsOp strips) {
+  auto before = std::make_tuple(written, histories, made);
+  onlyCounts = true;
+  visitAll(strips.getBody().front());
+  int64_t first = made;
+  visitAll(strips.getBody().front());
+  bool isOnce = made == first;
+  std::tie(written, histories, made) = std::move(before);
+  onlyCounts = false;
+  return isOnce;
+}
+
 void StateSharer::run() {
-  SmallVector<Operation *> statements;
-  for (Operation &op : *program.getBodyBlock())
-    if (isa<LaunchOp, WavesOp, RoundsOp>(op))
-      statements.push_back(&op);
-  for (Operation *statement : statements)
-    visit(statement);
+  visitAll(*program.getBodyBlock());
   builder.setInsertionPointToEnd(program.getBodyBlock());
   SmallVector<Attribute> states;
   for (const auto &[state, now] : written)

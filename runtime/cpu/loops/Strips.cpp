@@ -4,6 +4,7 @@
 #include "cpu/loops/Strips.h"
 #include "cpu/check/Check.h"
 #include "cpu/loops/Cycle.h"
+#include "ranks/Ranks.h"
 
 #include <algorithm>
 
@@ -30,19 +31,26 @@ int64_t Strips::primitiveBytes() const {
   return bytes;
 }
 
+/// Each of them has a part of a strip.
+int64_t Strips::ranks() const { return p_.ranks ? p_.ranks->size() : 1; }
+
+int64_t Strips::mostSize() const {
+  int64_t all = std::max<int64_t>(1, source_.count);
+  return group_.chunk > 0 ? std::min(group_.chunk, all) : all;
+}
+
 int64_t Strips::firstSize() const {
   int64_t all = std::max<int64_t>(1, source_.count);
   if (checkerOf(p_)) // it knows what is concurrent in whole kernels
     return all;
   if (p_.stripSize > 0)
     return std::min(p_.stripSize, all);
-  int64_t most = group_.chunk > 0 ? std::min(group_.chunk, all) : all;
   int64_t budget = p_.memory.budget();
   if (budget == 0)
-    return most;
+    return mostSize();
   // What a stage makes of a primitive is not known yet.
   int64_t guess = budget / (16 * primitiveBytes());
-  return std::min(most, std::clamp<int64_t>(guess, 1, 1024));
+  return std::min(mostSize(), std::clamp<int64_t>(guess, 1, 1024) * ranks());
 }
 
 /// After a strip: as much as would have used two fifths of what the budget
@@ -56,23 +64,42 @@ int64_t Strips::nextSize() const {
   double target =
       0.4 * static_cast<double>(std::max<int64_t>(0, budget - held_));
   double scale = std::clamp(target / used, 0.125, 2.0);
-  int64_t most = group_.chunk > 0 ? group_.chunk : source_.count;
   return std::clamp<int64_t>(
-      static_cast<int64_t>(static_cast<double>(size_) * scale), 1, most);
+      static_cast<int64_t>(static_cast<double>(size_) * scale), 1, mostSize());
 }
 
 // --- From strip to strip ----------------------------------------------------
 
+/// Where a rank has failed all hear of it, and then say whether they can take
+/// the strip back. The smallest size that one proposes is that of all.
+int64_t Strips::agree(int64_t size) {
+  Ranks &ranks = *p_.ranks;
+  if (!ranks.hasAgreed())
+    guarded(&p_, "strips",
+            [&] { size = ranks.agreeOnStrip(size, p_.status != PIKORT_OK); });
+  if (p_.status == PIKORT_OUT_OF_MEMORY && started_ && ranks.hasAgreed())
+    size = ranks.agreeOnStrip(smallerSize(), /*failed=*/false);
+  return size;
+}
+
 bool Strips::next() {
+  int64_t size = p_.status != PIKORT_OK ? smallerSize()
+                 : started_             ? nextSize()
+                                        : size_;
+  if (p_.ranks)
+    size = agree(size);
   if (p_.status != PIKORT_OK) {
-    if (!takeBack())
+    if (size == 0 && isCrowded())
+      failCollected();
+    if (p_.status != PIKORT_OUT_OF_MEMORY || size == 0)
       return false;
+    takeBack();
   } else if (started_) {
-    size_ = nextSize();
-    source_.begin = source_.end;
+    source_.takeStrip(source_.stripEnd, source_.stripEnd);
     ++number_;
   }
-  finished_ = started_ && source_.begin == source_.count;
+  size_ = size;
+  finished_ = started_ && source_.stripBegin == source_.count;
   if (finished_) {
     p_.memory.limitBins(p_.memory.budget());
     return false;
@@ -83,6 +110,7 @@ bool Strips::next() {
 
 /// What waits for a stage outside of the group leaves no room for strips.
 void Strips::failCollected() const {
+  p_.clearStatus();
   const Edge *largest = leaving_.front().edge;
   for (const Waiting &waiting : leaving_)
     if (queueOf(p_, *waiting.edge).bytes() > queueOf(p_, *largest).bytes())
@@ -99,8 +127,11 @@ void Strips::failCollected() const {
 void Strips::start() {
   started_ = true;
   committed_ = false;
-  source_.end = source_.begin + std::min(size_, source_.count - source_.begin);
-  divided_ |= source_.begin > 0 || source_.end < source_.count;
+  int64_t first = source_.stripBegin;
+  source_.takeStrip(first, first + std::min(size_, source_.count - first));
+  divided_ |= first > 0 || source_.stripEnd < source_.count;
+  if (p_.ranks)
+    p_.ranks->takePart(source_);
   restartCycles(p_, group_);
   for (Waiting &waiting : leaving_)
     waiting.mark = queueOf(p_, *waiting.edge).mark();
@@ -116,25 +147,32 @@ void Strips::start() {
 }
 
 void Strips::commit() {
+  if (p_.ranks && !committed_)
+    p_.ranks->agreeOnStrip(0, /*failed=*/false);
   committed_ = true;
   p_.memory.limitBins(0);
 }
 
 /// A strip that found no memory becomes a smaller one, if it has written
 /// nothing yet.
-bool Strips::takeBack() {
-  if (!started_ || committed_ || checkerOf(p_) ||
-      p_.status != PIKORT_OUT_OF_MEMORY)
-    return false;
-  if (source_.end - source_.begin <= 1) {
-    int64_t budget = p_.memory.budget();
-    if (leaving_.empty() || budget == 0 || held_ <= budget / 2)
-      return false;
-    p_.clearStatus();
-    failCollected();
-  }
+int64_t Strips::smallerSize() const {
+  int64_t size = source_.stripEnd - source_.stripBegin;
+  bool canBeTakenBack = started_ && !committed_ && !checkerOf(p_) &&
+                        p_.status == PIKORT_OUT_OF_MEMORY;
+  return canBeTakenBack && size > 1 ? std::max<int64_t>(1, size / 4) : 0;
+}
+
+bool Strips::isCrowded() const {
+  int64_t budget = p_.memory.budget();
+  return started_ && !committed_ && !checkerOf(p_) && !p_.ranks &&
+         p_.status == PIKORT_OUT_OF_MEMORY && !leaving_.empty() && budget > 0 &&
+         held_ > budget / 2;
+}
+
+void Strips::takeBack() {
   p_.clearStatus();
-  size_ = std::max<int64_t>(1, (source_.end - source_.begin) / 4);
+  if (p_.ranks)
+    p_.ranks->takeBack(group_);
   if (Kernel *kernel = cpuOf(p_).sourceKernels[group_.source].get())
     kernel->clear();
   for (size_t i = 0; i < group_.stages.size(); ++i) {
@@ -143,7 +181,6 @@ bool Strips::takeBack() {
   }
   for (Waiting &waiting : leaving_)
     queueOf(p_, *waiting.edge).rewind(waiting.mark);
-  return true;
 }
 
 void Strips::absorb(Kernel &kernel) {
@@ -165,10 +202,8 @@ void Strips::absorb(Kernel &kernel) {
 // --- The strips of a run ----------------------------------------------------
 
 void piko::rt::startStrips(pikort_pipeline &p) {
-  for (Source &source : p.sources) {
-    source.begin = 0;
-    source.end = source.count;
-  }
+  for (Source &source : p.sources)
+    source.takeStrip(0, source.count);
   p.memory.limitBins(p.memory.budget());
   for (const StripGroup &group : p.stripGroups)
     cpuOf(p).strips.push_back(std::make_unique<Strips>(p, group));

@@ -11,6 +11,10 @@
 // a strip may use half of what a budget leaves until then; afterwards a budget
 // holds no more, and the next strip is smaller.
 //
+// Ranks run the same strips, of which each has its part. They meet before each
+// strip, and before the first of its kernels that writes state: so all know
+// whether one of them found no memory while all can still take the strip back.
+//
 //===----------------------------------------------------------------------===//
 
 #ifndef PIKO_RUNTIME_CPU_STRIPS_H
@@ -25,7 +29,7 @@ public:
   Strips(pikort_pipeline &p, const StripGroup &group);
 
   /// Goes on to the next strip, or to a smaller one of the same primitives;
-  /// false at the end, or on an error.
+  /// false at the end, or on an error. Throws.
   bool next();
   bool isFinished() const { return finished_; }
   /// How many primitives the next one has at most.
@@ -34,7 +38,7 @@ public:
   bool isDivided() const { return divided_; }
   /// The strip's number: of two, the earlier one's primitives come first.
   uint32_t number() const { return number_; }
-  /// The strip can no longer be taken back.
+  /// The strip can no longer be taken back. Throws.
   void commit();
   /// Takes what a kernel outside of cycles emitted to stages that are not in
   /// the group.
@@ -46,12 +50,19 @@ private:
     Queue::Mark mark; ///< When the strip began.
   };
 
+  int64_t ranks() const;
+  int64_t mostSize() const;
   int64_t firstSize() const;
   int64_t nextSize() const;
   int64_t primitiveBytes() const;
   [[noreturn]] void failCollected() const;
   void start();
-  bool takeBack();
+  /// The size of a strip in place of the one that failed; 0: the error stays.
+  int64_t smallerSize() const;
+  void takeBack();
+  int64_t agree(int64_t size);
+  /// Whether a strip found no memory because of what waits for other stages.
+  bool isCrowded() const;
 
   pikort_pipeline &p_;
   const StripGroup &group_;
