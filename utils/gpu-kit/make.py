@@ -112,16 +112,14 @@ class Maker:
         for file in [*(self.kit / "bin").iterdir(), *(self.kit / "lib").iterdir()]:
             call(["strip", file])
 
-    def compile(self, file, pipe, chips):
-        """An object of one pipeline, for a processor and a device."""
-        out = self.work / f"{file.name.split('.')[0]}-{pipe}.o"
-        call([self.tools / "pikoc", file, "--pipe", pipe, "-o", out, "--target=auto",
-              f"--gpu-chip={chips}"])
+    def compile(self, file, pipe, *target):
+        """An object of one pipeline."""
+        out = self.work / f"{file.name.split('.')[0]}-{pipe}{target[0]}.o"
+        call([self.tools / "pikoc", file, "--pipe", pipe, "-o", out, *target])
         return out
 
-    def link(self, name, objects):
+    def link(self, out, objects):
         llvm = self.cached("PIKO_LLVM_PREFIX") or "/usr/lib/llvm-22"
-        out = self.kit / "pipelines" / f"{name}.so"
         call([f"{llvm}/bin/clang++", "-shared", "-s", "-o", out, *objects,
               "-L", self.arguments.build / "lib", "-lpikort"])
 
@@ -139,10 +137,12 @@ class Maker:
                  for name in self.arguments.examples}
         pipes = {name: call([self.tools / "pikoc", file, "--list-pipes"]).split()
                  for name, file in files.items()}
-        objects = {name: [self.pool.submit(self.compile, files[name], pipe, self.arguments.chips)
+        target = "--target=auto", f"--gpu-chip={self.arguments.chips}"
+        objects = {name: [self.pool.submit(self.compile, files[name], pipe, *target)
                           for pipe in found] for name, found in pipes.items()}
         for name, futures in objects.items():
-            self.link(name, [future.result() for future in futures])
+            self.link(self.kit / f"pipelines/{name}.so",
+                      [future.result() for future in futures])
         return pipes
 
     def is_exact(self, name, pipe):
@@ -159,9 +159,10 @@ class Maker:
              env={**self.environment, "PIKO_CAPTURE": str(self.kit / "captures")})
         return "captures/Raytracer.capture"
 
-    def draw(self, picture):
+    def draw(self, picture, library=None):
+        """Notes the picture's hash, as the processor draws it; `library`: by that."""
         words = [self.kit / "bin/piko-render-library",
-                 self.kit / picture["library"], "--pipe", picture["pipe"],
+                 library or self.kit / picture["library"], "--pipe", picture["pipe"],
                  self.kit / picture["scene"], *picture["options"], "--frames", 1,
                  "--warmup", 0, "--json"]
         told = json.loads(call(words, env=self.environment))
@@ -214,19 +215,25 @@ class Maker:
 
     def make_random(self, first, count):
         file, names = self.compare_random(first, count)
-        objects = {}
+        # What is for a processor draws here, and would make the kit larger.
+        objects, drawing = {}, []
         for name in names:
             if not (self.kit / f"captures/{name}.capture").exists():
                 continue
-            objects[name] = self.compile(file, name, self.arguments.random_chips)
+            objects[name] = self.compile(file, name, "--target=cuda",
+                                         f"--gpu-chip={self.arguments.random_chips}")
+            drawing.append(self.compile(file, name, "--target=cpu"))
         for capture in (self.kit / "captures").glob("Random*.capture"):
             seed = int(capture.stem.removeprefix("Random"))
             if first <= seed < first + count and capture.stem not in objects:
                 capture.unlink()
+        library = f"pipelines/random{first}.so"
+        drawer = self.work / f"random{first}.so"
         if objects:
-            self.link(f"random{first}", objects.values())
-        return [self.draw({"library": f"pipelines/random{first}.so", "pipe": name,
-                           "scene": f"captures/{name}.capture", "options": []})
+            self.link(self.kit / library, objects.values())
+            self.link(drawer, drawing)
+        return [self.draw({"library": library, "pipe": name,
+                           "scene": f"captures/{name}.capture", "options": []}, drawer)
                 for name in objects]
 
     def make_all_random(self, batch=20):
@@ -254,7 +261,7 @@ class Maker:
         # They are ten times as large as compressed; steps.py takes them out.
         [*self.pool.map(lambda file: call(["zstd", "-q", "-19", "--rm", file]),
                         (self.kit / "pipelines").glob("*.so"))]
-        call(["tar", "-C", self.work, "-I", "zstd -12 -T0", "-cf", self.arguments.out,
+        call(["tar", "-C", self.work, "-I", "zstd -19 -T0", "-cf", self.arguments.out,
               "gpu-kit"])
         unpacked = sum(it.stat().st_size for it in self.kit.rglob("*") if it.is_file())
         print(f"{self.arguments.out}: {self.arguments.out.stat().st_size / 1e6:.1f} MB, "
