@@ -9,9 +9,9 @@
 // RUN: pikoc %s --pipe Spans --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=SPANS
 // SPANS: remark: the threads of a block take one primitive after the other: a row's bounds depend on the row
 // RUN: pikoc %s --pipe Frames --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=FRAMES
-// FRAMES: remark: the threads of a block do not share pixels: an update follows from that of another pixel
+// FRAMES: remark: the threads of a block take one primitive after the other: its pixel is not what its loops count to
 // RUN: pikoc %s --pipe Carried --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=CARRIED
-// CARRIED: remark: the threads of a block do not share pixels: the outcome of an update decides about other pixels
+// CARRIED: remark: the threads of a block take one primitive after the other: a value goes from one pixel to the next; compute it from the pixel
 // RUN: pikoc %s --pipe Tables,Columns --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=TABLES
 // TABLES-COUNT-2: remark: the threads of a block take one primitive after the other: its pixel is not what its loops count to
 // RUN: pikoc %s --pipe Diagonals --target gpu-on-cpu --remarks -O0 -o /dev/null 2>&1 | FileCheck %s --check-prefix=DIAGONALS

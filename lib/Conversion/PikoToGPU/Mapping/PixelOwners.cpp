@@ -39,6 +39,7 @@ private:
   }
   bool share(UpdateOp update);
   bool canStride(const PixelLoop &loop) const;
+  bool guardIn(Block *block, UpdateOp update, Value root);
   bool guard(UpdateOp update, Value root);
   /// `first` and all after it in its block that depends on it.
   bool collectDependents(UpdateOp update, Operation *first,
@@ -164,12 +165,10 @@ bool OwnerFinder::checkBetween(ArrayRef<Operation *> group) {
   return true;
 }
 
-bool OwnerFinder::guard(UpdateOp update, Value root) {
-  Block *known = root.getParentBlock();
-  if (!items->isProperAncestor(known->getParentOp()) && known != body)
-    known = body;
+/// What follows from an update in a block, if one thread can do that alone.
+bool OwnerFinder::guardIn(Block *block, UpdateOp update, Value root) {
   llvm::SetVector<Operation *> group;
-  if (!collectDependents(update, known->findAncestorOpInBlock(*update),
+  if (!collectDependents(update, block->findAncestorOpInBlock(*update),
                          group) ||
       !checkGroup(root, group))
     return false;
@@ -180,6 +179,24 @@ bool OwnerFinder::guard(UpdateOp update, Value root) {
     return false;
   found.works.push_back({root, nullptr, ordered});
   return true;
+}
+
+/// In the block in which the pixel is known, so that all that is done for it is
+/// together; or else farther inside, as a pixel that is the same for all
+/// iterations of a loop may be known before it.
+bool OwnerFinder::guard(UpdateOp update, Value root) {
+  Block *known = root.getParentBlock();
+  if (!items->isProperAncestor(known->getParentOp()) && known != body)
+    known = body;
+  SmallVector<Block *> blocks{update->getBlock()};
+  while (blocks.back() != known)
+    blocks.push_back(blocks.back()->getParentOp()->getBlock());
+  for (Block *block : llvm::reverse(blocks)) {
+    found.obstacle.reset();
+    if (guardIn(block, update, root))
+      return true;
+  }
+  return false;
 }
 
 /// All that has an effect must be done by one thread.
