@@ -69,7 +69,7 @@ def PartitionProgram : Pass<"piko-partition-program", "::piko::PipelineOp"> {
     next, and what is left at the end goes to the first rank. `piko.common` names images
     of which each rank uses its own bins alone. `direct_map` asks for owners of
     neighbouring bins. Of each strip ranks have a part; a `piko.strips` that has cycles,
-    or would share state from one strip to the next, is taken apart.
+    that edges leave, or that would share state after each strip, is taken apart.
 
     **Guarantees** that each bin takes what it did, in the same order, for any number
     of ranks, and that all ranks run the same exchanges in the same order.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0 WITH LLVM-exception
 //
 // piko-partition-program:
-//   1. take strips with cycles apart, as ranks would meet in each wave;
+//   1. take strips apart that have cycles, as ranks would meet in each wave, or
+//      that something leaves;
 //   2. find who runs each kernel, and say so;
 //   3. make exchanges of the edges that lead from one rank to another;
 //   4. give keys to what is exchanged, and to what leads there;
@@ -97,7 +98,9 @@ void Partitioner::prepareStrips() {
        llvm::make_early_inc_range(program.getBodyBlock()->getOps<StripsOp>())) {
     strips.removeChunkAttr();
     Block &body = strips.getBody().front();
-    if (!body.getOps<WavesOp>().empty() || !body.getOps<RoundsOp>().empty())
+    // What leaves strips would wait for the last one, with keys.
+    if (strips.getNumResults() > 0 || !body.getOps<WavesOp>().empty() ||
+        !body.getOps<RoundsOp>().empty())
       takeApart(strips);
   }
 }

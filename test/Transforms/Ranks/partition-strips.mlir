@@ -51,13 +51,11 @@ piko.pipeline @Draw rank 2 {
   }
 }
 
-// What leaves several strips is in the order of strips, and not of ranks: it
-// has keys.
+// What leaves strips would have to wait for the last one.
 // CHECK-LABEL: piko.pipeline @Leave
-// CHECK:           %[[LEFT:.*]] = piko.strips
-// CHECK:             piko.leave
-// CHECK:           %[[HERE:.*]] = piko.exchange %[[LEFT]]
-// CHECK-NEXT:      piko.join @draw(concatenate %[[HERE]] keys 3)
+// CHECK:           piko.program ranks
+// CHECK-NOT:       piko.strips
+// CHECK:           piko.exchange
 piko.pipeline @Leave rank 2 {
   piko.image @color : @F rank 2
   piko.source @move
