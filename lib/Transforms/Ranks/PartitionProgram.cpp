@@ -92,16 +92,27 @@ Operation *piko::takeApart(StripsOp strips) {
   return first;
 }
 
+/// Why ranks do not run strips, or nothing. What leaves strips would wait for
+/// the last one, with keys.
+static StringRef whyNoStrips(StripsOp strips) {
+  Block &body = strips.getBody().front();
+  if (!body.getOps<WavesOp>().empty() || !body.getOps<RoundsOp>().empty())
+    return "they would meet in each wave of a cycle";
+  return strips.getNumResults() > 0
+             ? "what leaves a strip would wait for the last one"
+             : "";
+}
+
 /// How long a strip is, ranks agree on when they run.
 void Partitioner::prepareStrips() {
   for (auto strips :
        llvm::make_early_inc_range(program.getBodyBlock()->getOps<StripsOp>())) {
     strips.removeChunkAttr();
-    Block &body = strips.getBody().front();
-    // What leaves strips would wait for the last one, with keys.
-    if (strips.getNumResults() > 0 || !body.getOps<WavesOp>().empty() ||
-        !body.getOps<RoundsOp>().empty())
-      takeApart(strips);
+    StringRef why = whyNoStrips(strips);
+    if (why.empty())
+      continue;
+    strips.emitRemark() << "ranks run no strips of the source, as " << why;
+    takeApart(strips);
   }
 }
 
@@ -346,9 +357,6 @@ void Partitioner::divide() {
   findRankOrder();
 }
 
-/// Whether an edge holds what several strips have left, one after the other.
-static bool leavesStrips(Value edge) { return edge.getDefiningOp<StripsOp>(); }
-
 /// Parts of a source, or of a strip of it, are consecutive, and so is what
 /// follows from them.
 void Partitioner::findRankOrder() {
@@ -359,10 +367,9 @@ void Partitioner::findRankOrder() {
     for (Value edge : op.getOperands()) {
       Operation *origin = getOrigin(edge);
       auto from = dyn_cast_or_null<EdgeOp>(origin);
-      roots.insert(leavesStrips(edge) ? nullptr
-                   : from ? rankOrder.lookup(lookupInPipeline<StageOp>(
-                                from, from.getProducerAttr()))
-                          : origin);
+      roots.insert(from ? rankOrder.lookup(lookupInPipeline<StageOp>(
+                              from, from.getProducerAttr()))
+                        : origin);
     }
     if (roots.size() != 1 || !*roots.begin())
       return;
@@ -441,8 +448,7 @@ void Partitioner::exchange(OpOperand &operand, RankDivision to) {
   operand.set(
       ExchangeOp::create(builder, edge.getLoc(), value.getType(), value));
   ++exchanges;
-  if (from != RankDivision::First &&
-      (!rankOrder.contains(producer) || leavesStrips(value)))
+  if (from != RankDivision::First && !rankOrder.contains(producer))
     exchanged.insert(edge);
 }
 

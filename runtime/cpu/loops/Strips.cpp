@@ -147,7 +147,7 @@ void Strips::start() {
 }
 
 void Strips::commit() {
-  if (p_.ranks && !committed_)
+  if (p_.ranks && !committed_) // throws if another rank has failed
     p_.ranks->agreeOnStrip(0, /*failed=*/false);
   committed_ = true;
   p_.memory.limitBins(0);

@@ -61,6 +61,7 @@ piko.pipeline @Leave rank 2 {
   piko.source @move
   piko.edge @move[0] -> @turn
   piko.edge @turn[0] -> @draw
+  // expected-remark@+1 {{ranks run no strips of the source, as what leaves a strip would wait for the last one}}
   piko.stage @move bins [0, 0] threads 64 : @F -> [@F] {
     piko.process {
     ^bb0(%f: !piko.prim<@F>):
